@@ -10,12 +10,17 @@ use shared_mem::recording::{Clip, JointSeries, ObjectSeries, few_rows};
 /// Torques [N m] that hold the nominal model at positions [rad] against a free fall in its base frame [m/s²].
 pub type Holds = Box<dyn Fn(&[f64], [f64; 3]) -> Option<Vec<f64>>>;
 
+/// Torques of the nominal model's motion without gravity [N m]: at positions [rad], velocities [rad/s], accelerations [rad/s²].
+pub type Moves = Box<dyn Fn(&[f64], &[f64], &[f64]) -> Option<Vec<f64>>>;
+
 /// Gravity of the nominal model.
 pub struct Gravity {
     /// Its free fall in the base frame [m/s²].
     pub falls: [f64; 3],
     /// What holds it.
     pub holds: Holds,
+    /// What moves it.
+    pub moves: Moves,
 }
 
 impl Gravity {

@@ -4,9 +4,15 @@
 //! common gain; what that leaves, a square of a velocity, over all lags is the curve. A lag belongs to the 95 % interval where
 //! the curve is no higher than its lowest point by what its noise allows: the variance of the lag by the scores of stretches of
 //! time, as residuals of a controller last (Liang & Zeger 1986), over the curvature there. So a curve without a narrow valley
-//! gives a wide interval, a motion that repeats itself one that spans its periods, and one that reaches the end of the search
-//! tells no lag.
+//! gives a wide interval, and one that reaches the end of the search tells no lag. A motion that repeats itself has valleys a
+//! period apart: each that is no higher than the lowest by what its independent samples allow may be the true one, and it tells no
+//! lag either. Single rows that jump away and back are no motion.
 
+mod grid;
+
+pub use grid::usual_step;
+
+use grid::{Grid, Velocities};
 use serde::Serialize;
 
 /// Positions over time.
@@ -27,8 +33,10 @@ pub struct Lag {
     pub interval: [f64; 2],
     /// Correlation of the velocities at that lag [1].
     pub correlation: f64,
-    /// Whether the interval reaches the end of the search: the motion tells no lag.
+    /// The motion tells no lag: the interval reaches the end of the search, or the motion repeats itself.
     pub open: bool,
+    /// Lags far apart fit alike, as a motion that repeats itself leaves it.
+    pub repeats: bool,
 }
 
 /// Joints that lag alike.
@@ -42,40 +50,59 @@ pub struct Group {
     pub interval: [f64; 2],
 }
 
-/// Lags are searched this far both ways [s], but no further than this share of the shorter motion [1].
-const FARTHEST: f64 = 3.0;
-const SHARE: f64 = 0.4;
 /// What overlaps at a lag holds at least this share of the squared speeds of both [1]: rest beside rest tells nothing.
 const MOTION: f64 = 0.5;
-/// Most samples of a motion: longer ones are sampled more coarsely. Finest time between samples [s].
-const SAMPLES: f64 = 4000.0;
-const FINEST: f64 = 5e-3;
+/// Velocities are taken over so many steps before and behind: the fewest at which the arm is seen to follow.
+const WINDOWS: [f64; 4] = [2.0, 8.0, 32.0, 128.0];
 /// Stretches of time that are taken for independent of each other, and the two-sided 95 % of Student's t for their number.
 const STRETCHES: usize = 12;
 const STUDENT_95: f64 = 2.201;
 /// No arm does as it is told better than to this share of its squared speeds [1]: 0.1 % of its speed; a choice.
 const PERFECT: f64 = 1e-6;
+/// Valleys far apart count as equal where they differ by less than this share of the squared speeds [1]: an arm is 3 % of its speed
+/// off its commands, which no repetition of them tells apart; a choice.
+const ALIKE: f64 = 1e-3;
+/// Likelihood of a far valley, in sigmas of the square of so many independent samples as there are.
+const FAR_SIGMAS: f64 = 3.0;
+/// Between two valleys the curve rises by so many times what they may differ by [1].
+const RIDGE: f64 = 2.0;
 /// Groups differ by this much at least [s]; a choice, below the period of common controllers.
 const APART: f64 = 2e-3;
 
 /// The lag of a motion, joint by joint; `None` of too few rows, or where one of the two stands still.
 #[must_use]
 pub fn between(told: Motion<'_>, done: Motion<'_>) -> Option<Lag> {
-    let grid = Grid::of(told, done)?;
-    grid.lag(&grid.told, &grid.done)
+    Some(clearest(told, done)?.1)
+}
+
+/// The grid over which the motion shows best, and its lag: longer times show slow motion under noise.
+fn clearest(told: Motion<'_>, done: Motion<'_>) -> Option<(Grid, Lag)> {
+    let all = WINDOWS.iter().filter_map(|steps| {
+        let grid = Grid::of(told, done, *steps)?;
+        let lag = grid.lag(&grid.told, &grid.done)?;
+        Some((grid, lag))
+    });
+    let mut finest = None;
+    for (grid, lag) in all {
+        if lag.correlation > FOLLOWS {
+            return Some((grid, lag));
+        }
+        finest = finest.or(Some((grid, lag)));
+    }
+    finest
 }
 
 /// The lag of the speeds of all joints together, about their means: neither order nor signs of the joints change it.
 #[must_use]
 pub fn of_speeds(told: Motion<'_>, done: Motion<'_>) -> Option<Lag> {
-    let grid = Grid::of(told, done)?;
+    let grid = Grid::of(told, done, WINDOWS[0])?;
     grid.lag(&grid.told.speeds(), &grid.done.speeds())
 }
 
 /// Joints in groups of one lag each, the earliest first; a single group, or none, where no two joints differ surely.
 #[must_use]
 pub fn groups(told: Motion<'_>, done: Motion<'_>) -> Vec<Group> {
-    let Some(grid) = Grid::of(told, done) else { return Vec::new() };
+    let Some((grid, _)) = clearest(told, done) else { return Vec::new() };
     let own = |joint: usize| {
         let lag = grid.lag(&grid.told.joint(joint), &grid.done.joint(joint))?;
         (!lag.open && lag.correlation > FOLLOWS).then_some((joint, lag))
@@ -102,11 +129,27 @@ pub fn groups(told: Motion<'_>, done: Motion<'_>) -> Vec<Group> {
 pub fn in_words(groups: &[Group]) -> String {
     let one = |group: &Group| {
         let joints: Vec<String> = group.joints.iter().map(|joint| (joint + 1).to_string()).collect();
-        let [lo, hi] = group.interval.map(|end| end * 1e3);
-        format!("{:.0} ms ({lo:.0} to {hi:.0}) at joint {}", group.seconds * 1e3, joints.join(", "))
+        let [lag, lo, hi] = milliseconds([group.seconds, group.interval[0], group.interval[1]]);
+        format!("{lag} ms ({lo} to {hi}) at joint {}", joints.join(", "))
     };
     groups.iter().map(one).collect::<Vec<_>>().join("; ")
 }
+
+/// A lag and both ends of its interval [s] in milliseconds, with the digits that tell the ends apart.
+#[must_use]
+pub fn milliseconds(numbers: [f64; 3]) -> [String; 3] {
+    let with = |digits: usize| {
+        // Without the sign of a 0.
+        let scale = 10f64.powi(digits as i32);
+        numbers.map(|number| format!("{:.digits$}", (number * 1e3 * scale).round() / scale + 0.0))
+    };
+    let [lag, lo, hi] = (0..=MOST_DIGITS).map(with).find(|[_, lo, hi]| lo != hi).unwrap_or_else(|| with(MOST_DIGITS));
+    let short = if lag.contains('.') { lag.trim_end_matches('0').trim_end_matches('.') } else { &lag };
+    [short.to_owned(), lo, hi]
+}
+
+/// Digits of a millisecond behind the point, at most.
+const MOST_DIGITS: usize = 2;
 
 /// A joint follows its command closely enough for its own lag to count [1].
 const FOLLOWS: f64 = 0.97;
@@ -125,111 +168,23 @@ impl Group {
     }
 }
 
-/// Velocities of joints on an even grid; NaN where there are none.
-struct Velocities {
-    dof: usize,
-    values: Vec<f64>,
-}
-
-impl Velocities {
-    fn row(&self, at: usize) -> Option<&[f64]> {
-        self.values.get(at * self.dof..(at + 1) * self.dof).filter(|row| row[0].is_finite())
-    }
-
-    fn len(&self) -> usize {
-        self.values.len() / self.dof
-    }
-
-    fn joint(&self, joint: usize) -> Self {
-        Self { dof: 1, values: self.values.iter().skip(joint).step_by(self.dof).copied().collect() }
-    }
-
-    fn speeds(&self) -> Self {
-        let speed = |row: &[f64]| row.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let mut values: Vec<f64> = self.values.chunks_exact(self.dof).map(speed).collect();
-        let known = || values.iter().copied().filter(|v| v.is_finite());
-        let mean = known().sum::<f64>() / known().count().max(1) as f64;
-        values.iter_mut().for_each(|v| *v -= mean);
-        Self { dof: 1, values }
-    }
-
-    /// Squared speeds of all samples.
-    fn energy(&self) -> f64 {
-        self.values.iter().filter(|v| v.is_finite()).map(|v| v * v).sum()
-    }
-}
-
-/// Both motions on one grid.
-struct Grid {
-    step: f64,
-    /// Lags that are searched, each way [samples].
-    most: isize,
-    told: Velocities,
-    done: Velocities,
-}
-
 impl Grid {
-    fn of(told: Motion<'_>, done: Motion<'_>) -> Option<Self> {
-        if told.t.len() < 8 || done.t.len() < 8 || told.q.len() != done.q.len() || told.q.is_empty() {
-            return None;
-        }
-        let ends = [told, done].map(|motion| [motion.t[0], motion.t[motion.t.len() - 1]]);
-        let (from, to) = (ends[0][0].min(ends[1][0]), ends[0][1].max(ends[1][1]));
-        let shorter = ends.iter().map(|[from, to]| to - from).fold(f64::INFINITY, f64::min);
-        let steps = [told, done].map(|motion| usual_step(motion.t));
-        let step = FINEST.max(0.5 * steps[0]).max(0.5 * steps[1]).max((to - from) / SAMPLES);
-        let most = (FARTHEST.min(SHARE * shorter) / step) as isize;
-        if !(step.is_finite() && shorter > 0.0 && most > 1) {
-            return None;
-        }
-        let [told, done] = [(told, steps[0]), (done, steps[1])].map(|(motion, own)| {
-            // Over the time of a few rows, so that noise and the steps of an encoder do not hide the motion.
-            velocities(motion, (from, to, step), (2.0 * step).max(2.0 * own))
-        });
-        Some(Self { step, most, told, done })
-    }
-
     fn lag(&self, told: &Velocities, done: &Velocities) -> Option<Lag> {
         Curve::of(told, done, self.most)?.lag(self.step)
     }
 }
 
-/// The usual time between rows [s]; 0 of fewer than two.
-#[must_use]
-pub fn usual_step(t: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+/// How many of some residuals, row by row, are independent of each other: by how long they last (Geyer 1992).
+fn independent(left: &[f64], dof: usize) -> f64 {
+    let square = left.iter().map(|v| v * v).sum::<f64>();
+    let alike = |apart: usize| left.iter().zip(&left[apart..]).map(|(a, b)| a * b).sum::<f64>() / square;
+    let lasts: f64 = (1..left.len() / dof / 4).map(|rows| alike(rows * dof)).take_while(|alike| *alike > LASTS).sum();
+    let count = left.len() as f64 / (1.0 + 2.0 * lasts);
+    if count.is_finite() { count.max(STRETCHES as f64) } else { STRETCHES as f64 }
 }
 
-fn velocities(motion: Motion<'_>, (from, to, step): (f64, f64, f64), half: f64) -> Velocities {
-    let (first, last) = (motion.t[0], motion.t[motion.t.len() - 1]);
-    let count = ((to - from) / step) as usize + 1;
-    let at = |i: usize| {
-        let t = from + i as f64 * step;
-        let (a, b) = ((t - half).max(first), (t + half).min(last));
-        let inside = t >= first && t <= last && b > a;
-        let velocity = move |q: &Vec<f64>| {
-            if inside { (between_rows(motion.t, q, b) - between_rows(motion.t, q, a)) / (b - a) } else { f64::NAN }
-        };
-        motion.q.iter().map(velocity)
-    };
-    let mut values: Vec<f64> = (0..count).flat_map(at).collect();
-    // A row in which one joint is unknown tells nothing.
-    for row in values.chunks_exact_mut(motion.q.len()) {
-        if !row.iter().all(|v| v.is_finite()) {
-            row.fill(f64::NAN);
-        }
-    }
-    Velocities { dof: motion.q.len(), values }
-}
-
-/// A joint's position at a time within the rows, on the straight line between two of them.
-fn between_rows(t: &[f64], values: &[f64], at: f64) -> f64 {
-    let next = t.partition_point(|t| *t < at).min(t.len() - 1);
-    let Some(before) = next.checked_sub(1).filter(|before| t[next] > t[*before]) else { return values[next] };
-    values[before] + (at - t[before]) / (t[next] - t[before]) * (values[next] - values[before])
-}
+/// Residuals so far apart that they correlate less are independent [1].
+const LASTS: f64 = 0.05;
 
 /// What the samples of both say at one lag.
 #[derive(Debug, Clone, Copy, Default)]
@@ -357,9 +312,9 @@ impl<'a> Curve<'a> {
         if exact.left <= found.left { exact } else { found }
     }
 
-    /// Information on the lag there, 1 over the square of a sample in units of the squares that are left; and its variance
-    /// [samples^2] by the scores of stretches.
-    fn certainty(&self, lag: f64) -> (f64, f64) {
+    /// Information on the lag there, 1 over the square of a sample in units of the squares that are left; its variance
+    /// [samples^2] by the scores of stretches; and how many of the residuals are independent of each other.
+    fn certainty(&self, lag: f64) -> (f64, f64, f64) {
         let sums = self.sums(lag);
         let gain = sums.gain();
         let slope = |late: usize, joint: usize| {
@@ -379,6 +334,7 @@ impl<'a> Curve<'a> {
         });
         let [first, last] = [rows.first(), rows.last()].map(|row| row.map_or(0, |row| row.0));
         let length = (last - first) / STRETCHES + 1;
+        let independent = independent(&rows.iter().map(|row| row.3).collect::<Vec<f64>>(), self.told.dof);
         let mut scores = [0.0; STRETCHES];
         let mut information = 0.0;
         for (i, told, slope, left) in rows {
@@ -388,7 +344,7 @@ impl<'a> Curve<'a> {
         }
         let correction = STRETCHES as f64 / (STRETCHES - 1) as f64;
         let outer = correction * scores.iter().map(|score| score * score).sum::<f64>();
-        (information, outer / (information * information))
+        (information, outer / (information * information), independent)
     }
 
     fn lag(&self, step: f64) -> Option<Lag> {
@@ -403,7 +359,7 @@ impl<'a> Curve<'a> {
         let grid = known.iter().map(|(lag, left)| Valley { lag: *lag as f64, left: *left });
         let best = lowest.or_else(|| grid.min_by(|a, b| a.left.total_cmp(&b.left)))?;
         let sums = self.sums(best.lag);
-        let (information, variance) = self.certainty(best.lag);
+        let (information, variance, independent) = self.certainty(best.lag);
         // Residuals that last make the variance larger than the noise alone would.
         let variance = variance.max(best.left / information);
         let by_noise = STUDENT_95 * STUDENT_95 * variance * information / sums.count;
@@ -413,7 +369,16 @@ impl<'a> Curve<'a> {
         let limit = best.left + allowed;
         let half = (sums.count * allowed / information).sqrt();
         let half = if half.is_finite() { half } else { f64::INFINITY };
-        let likely = |valley: &&Valley| valley.left <= limit;
+        let alike = best.left * FAR_SIGMAS * (2.0 / independent).sqrt() + ALIKE * sums.done / sums.count;
+        // A valley of its own, behind a ridge that no noise makes.
+        let far = |valley: &Valley| {
+            let [from, to] = [valley.lag.min(best.lag), valley.lag.max(best.lag)];
+            let between = known.iter().filter(|(lag, _)| (from..to).contains(&(*lag as f64)));
+            between.map(|(_, left)| *left).fold(0.0, f64::max) > best.left + RIDGE * alike
+        };
+        let again = |valley: &Valley| valley.left <= best.left + alike && far(valley);
+        let likely = |valley: &&Valley| valley.left <= limit || again(valley);
+        let repeats = valleys.iter().any(again);
         let nearest = valleys.iter().filter(likely).min_by(|a, b| a.lag.abs().total_cmp(&b.lag.abs()));
         let chosen = match nearest {
             Some(nearest) if (nearest.lag - best.lag).abs() > 1.0 => self.bottom(nearest.lag),
@@ -424,12 +389,13 @@ impl<'a> Curve<'a> {
         let on_grid = known.iter().filter(|(_, left)| *left <= limit).map(|(lag, _)| *lag as f64);
         let wide = |[lo, hi]: [f64; 2], lag: f64| [lo.min(lag), hi.max(lag)];
         let [lo, hi] = around.chain(on_grid).fold([f64::INFINITY, f64::NEG_INFINITY], wide);
-        let open = lowest.is_none() || lo <= first as f64 || hi >= last as f64;
+        let open = repeats || lowest.is_none() || lo <= first as f64 || hi >= last as f64;
         Some(Lag {
             seconds: chosen.lag * step,
             interval: [lo.max(first as f64) * step, hi.min(last as f64) * step],
             correlation: self.sums(chosen.lag).correlation(),
             open,
+            repeats,
         })
     }
 }

@@ -39,7 +39,7 @@ mod windows;
 
 pub use arm::{Arm, Arms};
 pub use cell::{Rotors, UsualController, is_franka, usual_controller};
-pub use clip::{Gravity, Holds};
+pub use clip::{Gravity, Holds, Moves};
 pub use contents::{Contents, look};
 pub use data_set::{DataSetError, DataSetPlan, DataSetWriter, Feature, FeatureKind, Frames};
 pub use error::ImportError;

@@ -41,9 +41,18 @@ fn moments(seed: u64, pull: [f64; 3], of: impl Fn(usize, f64) -> f64) -> Vec<Mom
             let axes = [0, 1, 2].map(|axis| holds(q, axis));
             let tau = (0..3).map(|j| {
                 let weight: f64 = (0..3).map(|k| axes[k][j] * pull[k]).sum();
-                of(j, weight + friction[j] * dq[j].signum() + 0.05 * ddq[j]) + 0.05 * (rng.random_range(-1.0..1.0))
+                let motion = 0.2 * ddq[j] * q[(j + 1) % 3].cos();
+                of(j, weight + motion + friction[j] * dq[j].signum() + 0.05 * ddq[j])
+                    + 0.05 * (rng.random_range(-1.0..1.0))
             });
-            Moment { tau: tau.collect(), holds: axes.map(|axis| axis.to_vec()), dq: dq.to_vec(), ddq: ddq.to_vec() }
+            Moment {
+                tau: tau.collect(),
+                holds: axes.map(|axis| axis.to_vec()),
+                // Another inertia than the joints' own, so that the motion is told.
+                motion: (0..3).map(|j| 0.2 * ddq[j] * q[(j + 1) % 3].cos()).collect(),
+                dq: dq.to_vec(),
+                ddq: ddq.to_vec(),
+            }
         })
         .collect()
 }
@@ -89,6 +98,43 @@ fn a_joint_that_is_turned_and_a_missing_torque_constant_are_named() {
         assert!(matches!(one.1, Finding::Scaled(Some(2), factor) if (factor - 0.12).abs() < 0.05), "{one:?}");
         let all = found(seed, DOWN, |_, tau| 12.0 * tau);
         assert!(matches!(all.1, Finding::Scaled(None, factor) if (factor - 12.0).abs() < 1.0), "{all:?}");
+    }
+}
+
+#[test]
+fn one_joint_that_is_turned_is_never_gravity_that_was_taken_off() {
+    for seed in 0..40 {
+        for odd in 1..3 {
+            let (weight, finding) = found(seed, DOWN, |joint, tau| if joint == odd { -tau } else { tau });
+            assert!(matches!(finding, Finding::Turned(joint, _) if joint == odd), "{seed} {odd}: {finding:?}");
+            assert_eq!(weight.turned(DOWN).len(), 1);
+        }
+    }
+}
+
+#[test]
+fn torques_that_are_turned_are_told_from_a_base_that_hangs_by_their_motion() {
+    for seed in 0..20 {
+        let (weight, finding) = found(seed, DOWN, |_, tau| -tau);
+        assert!(matches!(finding, Finding::Scaled(None, factor) if (factor + 1.0).abs() < 0.1), "{seed}: {finding:?}");
+        assert_eq!(found(seed, [0.0, 0.0, 9.81], |_, tau| tau).1, Finding::Elsewhere, "{weight:?}");
+        for (factor, unit) in [(100.0, "N cm"), (1e3, "mN m"), (10.197, "kgf cm")] {
+            let (weight, finding) = found(seed, DOWN, |_, tau| factor * tau);
+            let Finding::Scaled(None, seen) = finding else { panic!("{seed}: {finding:?} {weight:?}") };
+            assert!(import::weight::meaning(seen).contains(unit), "{seen}");
+        }
+    }
+}
+
+#[test]
+fn noise_is_no_torque_without_gravity() {
+    for seed in 0..40 {
+        let mut rng = Pcg64::seed_from_u64(500 + seed);
+        let mut noise = moments(seed, DOWN, |_, tau| tau);
+        for moment in &mut noise {
+            moment.tau = (0..3).map(|_| rng.random_range(-0.1..0.1)).collect();
+        }
+        assert_eq!(Weight::of(&noise).expect("a fit").finding(DOWN), Finding::Noise, "{seed}");
     }
 }
 

@@ -102,6 +102,9 @@ pub(super) const ACCELERATION: f64 = 0.02;
 pub(super) const TORQUE_LEFT: f64 = 1e-3;
 /// ...and another order or sign less than this share of that [1].
 pub(super) const TORQUE_BETTER: f64 = 0.25;
+/// ...and less than this share of all [1]: torques that the model does not explain after all are none of its arm's. Friction of a
+/// joint and a load that is not in the model leave a tenth.
+pub(super) const TORQUE_EXPLAINED: f64 = 0.2;
 /// Positions may exceed a joint's range by this [rad]: readings at a stop.
 pub(super) const RANGE_MARGIN: f64 = 0.05;
 /// A share of a clip's rows that is most of them [1].

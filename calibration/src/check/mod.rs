@@ -61,3 +61,4 @@ mod velocity;
 
 pub use remark::{Fault, Remark, Severity, Size};
 pub use session::{Checked, check, check_clips};
+pub(crate) use torque::motion;

@@ -4,9 +4,9 @@
 //! Inverse dynamics of the links: `tau_J = M(q) ddq + c(q, dq) + g(q)`, M without the rotors, which lie before the sensor.
 
 use super::columns::{Columns, Signals, between};
-use super::conversion;
 use super::limits::{
-    ACCELERATION, CARRIES_GRAVITY, LEAST_GRAVITY, NOT_ITS_SLOPE, TORQUE_BETTER, TORQUE_LEFT, TORQUE_ROWS,
+    ACCELERATION, CARRIES_GRAVITY, LEAST_GRAVITY, NOT_ITS_SLOPE, TORQUE_BETTER, TORQUE_EXPLAINED, TORQUE_LEFT,
+    TORQUE_ROWS,
 };
 use super::remark::{Fault, Remark, Size};
 use super::statistics::mean;
@@ -69,45 +69,62 @@ pub(super) fn remarks(clip: &Columns, arm: &ArmModel) -> Vec<Remark> {
     found
 }
 
-/// What explains the measured torques where the model does not: joints first, then the base, units, and weight that is missing.
+/// What explains the measured torques where the model does not: joints or the base, whichever leaves less; then units, and weight
+/// that is missing.
 fn of_measured(clip: &Columns, arm: &ArmModel, moments: &[Moment]) -> Option<Remark> {
     let models: Vec<Model> = moments.iter().map(|moment| model(arm, moment)).collect();
-    let weight = weight(arm, moments, &models);
-    let finding = weight.as_ref().map(|weight| weight.finding(arm.free_fall()));
-    let other = otherwise(clip, arm, moments, &models);
-    if let (Some(weight), Some(Finding::Elsewhere)) = (&weight, finding) {
-        let falling = |(moment, model): (&Moment, &Model)| model.falling(arm, moment, weight.pull);
-        let leaning: Vec<Model> = moments.iter().zip(&models).map(falling).collect();
-        let by_base = left(moments, &leaning, arm.dof());
-        // Upside down, or every torque turned round: what the motion needs tells them apart.
-        let negative: Vec<Moment> = moments.iter().map(|m| Moment { tau: m.tau.map(|tau| -tau), ..*m }).collect();
-        let by_sign = left(&negative, &models, arm.dof());
-        if by_base <= by_sign && other.as_ref().is_none_or(|(_, by_joints)| by_base < *by_joints) {
-            return Some(elsewhere(clip, weight));
-        }
-        if by_sign < by_base {
-            return Some(scaled(clip, -1.0, [-1.0; 2], ": counted the other way round"));
-        }
+    let falls = arm.free_fall();
+    let weight = weight(arm, moments, &models)?;
+    let finding = weight.finding(falls);
+    let by_weight = by_weight(arm, moments, &models, (&weight, finding));
+    if let Some((remark, by_joints)) = otherwise(clip, arm, moments, &models)
+        && by_weight.is_none_or(|by_weight| by_joints <= by_weight)
+    {
+        return Some(remark);
     }
-    other.map(|(remark, _)| remark).or_else(|| match finding {
-        Some(Finding::Turned(joint, factor)) => Some(of_joint(clip, joint, factor, ", counted the other way round")),
-        Some(Finding::Scaled(Some(joint), factor)) => {
-            Some(of_joint(clip, joint, factor, ": another unit, or a torque constant or gear ratio is missing"))
-        }
-        finding => unit(clip, moments, &models, arm.dof()).or_else(|| match (finding, &weight) {
-            (Some(Finding::Absent(_)), Some(weight)) => Some(without(clip, weight.share(arm.free_fall()))),
-            (Some(Finding::Scaled(None, factor)), _) => Some(scaled(clip, factor, [factor; 2], "")),
-            _ => None,
-        }),
-    })
+    match finding {
+        Finding::Elsewhere => Some(elsewhere(clip, &weight, falls)),
+        Finding::Turned(..) => Some(turned(clip, &weight.turned(falls))),
+        Finding::Scaled(Some(joint), factor) => Some(of_joint(clip, joint, factor, &weight::meaning(factor))),
+        Finding::Scaled(None, factor) => unit(clip, moments, &models, arm.dof())
+            .or_else(|| Some(scaled(clip, factor, [factor; 2], &format!(": {}", weight::meaning(factor))))),
+        Finding::Absent(_) => Some(without(clip, weight.share(falls))),
+        Finding::Noise => Some(noise(clip)),
+        Finding::Whole(_) | Finding::Partly(_) | Finding::NotTold => unit(clip, moments, &models, arm.dof()),
+    }
 }
 
-/// The weight in torques, what the motion needs taken off.
+/// What is left of the torques' squares where they are what their weight says [1]; `None` where it names nothing.
+fn by_weight(arm: &ArmModel, moments: &[Moment], models: &[Model], of: (&Weight, Finding)) -> Option<f64> {
+    let (weight, finding) = of;
+    let scaled = |factor: &dyn Fn(usize) -> f64| {
+        let tau = |m: &Moment| std::array::from_fn(|joint| m.tau[joint] / factor(joint));
+        let moments: Vec<Moment> = moments.iter().map(|m| Moment { tau: tau(m), ..*m }).collect();
+        Some(left(&moments, models, arm.dof()))
+    };
+    match finding {
+        Finding::Elsewhere => {
+            let falling = |(moment, model): (&Moment, &Model)| model.falling(arm, moment, weight.pull);
+            let leaning: Vec<Model> = moments.iter().zip(models).map(falling).collect();
+            Some(left(moments, &leaning, arm.dof()))
+        }
+        Finding::Turned(..) => {
+            let turned = weight.turned(arm.free_fall());
+            scaled(&|joint| if turned.iter().any(|(other, _)| *other == joint) { -1.0 } else { 1.0 })
+        }
+        Finding::Scaled(Some(odd), factor) => scaled(&|joint| if joint == odd { factor } else { 1.0 }),
+        Finding::Scaled(None, factor) => scaled(&|_| factor),
+        _ => None,
+    }
+}
+
+/// The weight in torques, beside what the motion needs.
 fn weight(arm: &ArmModel, moments: &[Moment], models: &[Model]) -> Option<Weight> {
     let dof = arm.dof();
     let unit = |axis: usize| std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 });
     let of = |(moment, model): (&Moment, &Model)| weight::Moment {
-        tau: (0..dof).map(|j| moment.tau[j] - model.tau[j] + model.gravity[j]).collect(),
+        tau: moment.tau[..dof].to_vec(),
+        motion: (0..dof).map(|j| model.tau[j] - model.gravity[j]).collect(),
         holds: [0, 1, 2].map(|axis| arm.holding(&moment.q, unit(axis))[..dof].to_vec()),
         dq: moment.dq[..dof].to_vec(),
         ddq: moment.ddq[..dof].to_vec(),
@@ -152,13 +169,19 @@ fn moments(motion: &Signals, tau_t: &[f64], tau: &[Vec<f64>], dof: usize) -> Opt
 }
 
 fn model(arm: &ArmModel, moment: &Moment) -> Model {
-    let state = JointState { q: moment.q, dq: moment.dq };
-    let (mass, bias, rotor) = (arm.mass_matrix(&moment.q), arm.bias(&state), arm.rotor_inertia());
-    let tau = std::array::from_fn(|j| {
-        let inertial: f64 = mass[j].iter().zip(&moment.ddq).map(|(m, a)| m * a).sum();
-        inertial - rotor[j] * moment.ddq[j] + bias[j]
-    });
-    Model { tau, gravity: arm.gravity(&moment.q) }
+    let gravity = arm.gravity(&moment.q);
+    let motion = motion(arm, &JointState { q: moment.q, dq: moment.dq }, &moment.ddq);
+    Model { tau: std::array::from_fn(|j| motion[j] + gravity[j]), gravity }
+}
+
+/// Torques of the model's motion behind the gears, gravity apart [N m].
+pub(crate) fn motion(arm: &ArmModel, state: &JointState, ddq: &Joints) -> Joints {
+    let (mass, bias, rotor) = (arm.mass_matrix(&state.q), arm.bias(state), arm.rotor_inertia());
+    let gravity = arm.gravity(&state.q);
+    std::array::from_fn(|j| {
+        let inertial: f64 = mass[j].iter().zip(ddq).map(|(m, a)| m * a).sum();
+        inertial - rotor[j] * ddq[j] + bias[j] - gravity[j]
+    })
 }
 
 impl Model {
@@ -175,11 +198,12 @@ fn sized(remark: Remark, [share, half]: [f64; 2]) -> Remark {
 }
 
 /// The base is mounted another way than the model stands.
-fn elsewhere(clip: &Columns, weight: &Weight) -> Remark {
+fn elsewhere(clip: &Columns, weight: &Weight, falls: [f64; 3]) -> Remark {
     let what = format!(
         "measured torques hold a weight that pulls {}, and not as in the model: the base is mounted another way than the model \
-         stands",
-        weight.in_words()
+         stands{}",
+        weight.in_words(),
+        weight.doubt(falls)
     );
     let half = weight.half.iter().copied().fold(0.0, f64::max);
     let size = weight.size();
@@ -190,15 +214,41 @@ fn elsewhere(clip: &Columns, weight: &Weight) -> Remark {
         )
 }
 
+/// Torques of joints that are counted the other way round, beside others that are not: at least one.
+fn turned(clip: &Columns, joints: &[(usize, f64)]) -> Remark {
+    let who: Vec<String> = joints.iter().map(|(joint, _)| clip.joint(*joint)).collect();
+    let (joint, factor) = joints.first().copied().unwrap_or_default();
+    if who.len() == 1 {
+        return of_joint(clip, joint, factor, "counted the other way round");
+    }
+    let what = format!(
+        "the measured torques of {} are {factor:.2} times what holds them by the weight that the other joints show: counted the other \
+         way round",
+        who.join(", ")
+    );
+    torque_unit(clip, format!("measured effort, {}", who.join(", ")), what, Size::count(factor, "1"))
+}
+
 /// The torque of one joint beside the weight that the others show.
 fn of_joint(clip: &Columns, joint: usize, factor: f64, meaning: &str) -> Remark {
     let who = clip.joint(joint);
     let what = format!(
-        "the measured torque of {who} is {factor:.2} times what holds it by the weight that the other joints show{meaning}"
+        "the measured torque of {who} is {factor:.2} times what holds it by the weight that the other joints show: {meaning}"
     );
-    Remark::new(Fault::TorqueUnit, &clip.file, format!("measured effort, {who}"), what)
-        .sized(Size::count(factor, "1"))
+    torque_unit(clip, format!("measured effort, {who}"), what, Size::count(factor, "1"))
+}
+
+fn torque_unit(clip: &Columns, channel: String, what: String, size: Size) -> Remark {
+    Remark::new(Fault::TorqueUnit, &clip.file, channel, what)
+        .sized(size)
         .mended_by("publish the torque behind the gear in N m, positive in the direction of q")
+}
+
+fn noise(clip: &Columns) -> Remark {
+    let what = "nothing in the measured torques goes with the motion, neither weight nor friction nor inertia: they are not what moves \
+                this arm";
+    Remark::new(Fault::TorqueGravity, &clip.file, "measured effort", what)
+        .mended_by("log tau_J, or leave effort out of the topic")
 }
 
 fn without(clip: &Columns, share: [f64; 2]) -> Remark {
@@ -236,20 +286,14 @@ fn unit(clip: &Columns, moments: &[Moment], models: &[Model], dof: usize) -> Opt
     {
         return None;
     }
-    let meaning = match conversion::known(factor) {
-        Some((_, what)) if what.contains("unit") => format!(": {what}"),
-        _ if (factor + 1.0).abs() < 0.5 => ": counted the other way round".into(),
-        _ => String::new(),
-    };
+    let meaning = format!(": {}", weight::meaning(factor));
     let half = 1.96 * (factor * factor * (1.0 / (correlation * correlation) - 1.0) / pairs().count() as f64).sqrt();
     Some(scaled(clip, factor, [factor - half, factor + half], &meaning))
 }
 
 fn scaled(clip: &Columns, factor: f64, interval: [f64; 2], meaning: &str) -> Remark {
     let what = format!("measured torques are {factor:.4} times those of the model{meaning}");
-    Remark::new(Fault::TorqueUnit, &clip.file, "measured effort", what)
-        .sized(Size { value: factor, interval, unit: "1" })
-        .mended_by("publish the torque behind the gear in N m, positive in the direction of q")
+    torque_unit(clip, "measured effort".into(), what, Size { value: factor, interval, unit: "1" })
 }
 
 /// Another meaning of the joints.
@@ -263,12 +307,15 @@ enum Other {
     TorqueTurned(usize),
     /// The two are exchanged.
     Swapped(usize, usize),
+    /// The torques of the two are.
+    TorquesSwapped(usize, usize),
 }
 
 impl Other {
     fn all(dof: usize) -> Vec<Self> {
         let turned = (0..dof).flat_map(|j| [Self::Turned(j), Self::PositionTurned(j), Self::TorqueTurned(j)]);
-        turned.chain((0..dof).flat_map(|a| (a + 1..dof).map(move |b| Self::Swapped(a, b)))).collect()
+        let pairs = (0..dof).flat_map(|a| (a + 1..dof).map(move |b| (a, b)));
+        turned.chain(pairs.flat_map(|(a, b)| [Self::Swapped(a, b), Self::TorquesSwapped(a, b)])).collect()
     }
 
     fn of(self, moment: &Moment) -> Moment {
@@ -283,6 +330,7 @@ impl Other {
                 }
             }
             Self::TorqueTurned(j) => other.tau[j] = -other.tau[j],
+            Self::TorquesSwapped(a, b) => other.tau.swap(a, b),
             Self::Swapped(a, b) => {
                 for joints in [&mut other.q, &mut other.dq, &mut other.ddq, &mut other.tau] {
                     joints.swap(a, b);
@@ -318,12 +366,15 @@ fn otherwise(clip: &Columns, arm: &ArmModel, moments: &[Moment], models: &[Model
     }
     let under = |other: Other| {
         let moments: Vec<Moment> = moments.iter().map(|moment| other.of(moment)).collect();
+        if matches!(other, Other::TorqueTurned(_) | Other::TorquesSwapped(..)) {
+            return (other, left(&moments, models, dof));
+        }
         let models: Vec<Model> = moments.iter().map(|moment| model(arm, moment)).collect();
         (other, left(&moments, &models, dof))
     };
     let (other, better) = Other::all(dof).into_iter().map(under).min_by(|a, b| a.1.total_cmp(&b.1))?;
     let weightless: Vec<Moment> = moments.iter().zip(models).map(|(moment, model)| carrying(moment, model)).collect();
-    if better > TORQUE_BETTER * as_is.min(left(&weightless, models, dof)) {
+    if better > TORQUE_EXPLAINED.min(TORQUE_BETTER * as_is.min(left(&weightless, models, dof))) {
         return None;
     }
     let [before, after] = [as_is, better].map(|share| 100.0 * share);
@@ -346,6 +397,12 @@ fn otherwise(clip: &Columns, arm: &ArmModel, moments: &[Moment], models: &[Model
             "joint order".to_owned(),
             format!("{leaves} if {} and {} are exchanged", clip.joint(a), clip.joint(b)),
             "put the names of `[robot] joints` or of the topics into the order of their columns",
+        ),
+        Other::TorquesSwapped(a, b) => (
+            Fault::JointOrder,
+            "measured effort".to_owned(),
+            format!("{leaves} if the torques of {} and {} are exchanged", clip.joint(a), clip.joint(b)),
+            "put the torques into the order of the positions",
         ),
     };
     let remark = Remark::new(fault, &clip.file, channel, what)

@@ -1,6 +1,7 @@
 //! `calibration import`.
 
 use super::print;
+use crate::check::motion;
 use clap::Args;
 use import::{Arm, Gravity, Imported, Note, Order, Outcome, Rotors};
 use serde::Serialize;
@@ -11,7 +12,7 @@ use shared_mem::progress::Progress;
 use shared_mem::typed::Command;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use twin::arm::{ArmModel, HeldJoint};
+use twin::arm::{ArmModel, HeldJoint, JointState};
 use twin::description::{shown_robot, shown_urdf};
 
 #[derive(Debug, Args)]
@@ -148,8 +149,14 @@ fn arm(cell: &Cell, urdf: Option<&str>) -> Result<Option<Arm>, String> {
     let rotors = (!without_inertia.is_empty()).then_some(Rotors { without_inertia, rotor_inertia });
     let shown = shown.map(Arc::new);
     let falls = model.free_fall();
+    let moving = model.clone();
     let gravity = model.has_geometry().then(|| Gravity {
         falls,
+        moves: Box::new(move |q: &[f64], dq: &[f64], ddq: &[f64]| {
+            let state = JointState { q: joints_from(q), dq: joints_from(dq) };
+            (q.len() == moving.dof())
+                .then(|| motion(&moving, &state, &joints_from(ddq)).get(..q.len()).unwrap_or(&[]).to_vec())
+        }),
         holds: Box::new(move |q: &[f64], falls| {
             (q.len() == model.dof())
                 .then(|| model.holding(&joints_from(q), falls).get(..q.len()).unwrap_or(&[]).to_vec())

@@ -3,11 +3,18 @@
 
 use super::Notes;
 use super::track::Track;
-use crate::lag::{self, Lag, Motion};
+use crate::lag::{self, Group, Lag, Motion};
 use crate::mapping::JointColumns;
 
 /// Correlation below which nothing is said.
 const CLEAR: f64 = 0.5;
+/// Lags that are nearer to none [s], or by so many rows, are no lead and no lag worth the name.
+const LEAD: f64 = 0.015;
+const LEAD_ROWS: f64 = 3.0;
+/// Commands that are logged behind what they cause come so many rows late at most [1].
+const ROWS_LATE: f64 = 1.5;
+/// Half the narrowest interval of a lag that digits are kept for [s].
+const FINEST: f64 = 1e-4;
 /// Fast and slow parts that differ by this factor tell a constant phase from a constant delay.
 const FASTER: f64 = 1.5;
 /// A motion goes back where it does so by this share of the longest way of a joint [1]; a choice, far beyond noise.
@@ -30,53 +37,87 @@ pub(super) fn look(measured: &Track, desired: &Track, columns: &mut JointColumns
     let [did, told] = [measured, desired].map(|track| Motion { t: &track.t, q: &track.q[..joints] });
     let Some(lag) = lag::between(told, did) else { return };
     let step = measured.step();
-    let [low, high] = lag.interval.map(|end| end * 1e3);
-    if lag.open {
-        notes.why(
-            line,
-            format!(
-                "this motion does not tell the lag between commands and states: any from {low:.0} to {high:.0} ms fits about as \
-                 well; nothing is shifted. A motion that goes forth and back tells it"
-            ),
-        );
-        return;
-    }
-    if lag.correlation < CLEAR {
-        let what = format!("the arm does not clearly follow its commands (correlation {:.2} at best)", lag.correlation);
-        notes.why(line, what);
-        return;
-    }
-    let ms = lag.seconds * 1e3;
-    let within = format!("95 % {low:.0} to {high:.0} ms");
-    if lag.interval[1] < 0.0 && lag.seconds < -1.5 * step {
-        let early = format!(
-            "the arm moves {:.0} ms before its commands ({within}), which no arm does: the commands were stamped by another clock",
-            -ms
-        );
-        if turns(measured) {
-            columns.shift = (lag.seconds / step).round() * step;
-            notes.why(line, early);
-        } else {
-            let what = format!(
-                "{early}. The motion goes one way only, where a lead and an arm that is ahead look alike: nothing is shifted; \
-                 {:.3} here shifts them",
-                lag.seconds
-            );
-            notes.why(line, what);
-        }
-        return;
-    }
-    let mut said = format!(
-        "the arm follows its commands by {ms:.0} ms ({within}, correlation {:.2}); nothing is shifted, since a delay is the twin's \
-         to explain",
-        lag.correlation
-    );
-    let groups = lag::groups(told, did);
-    if groups.len() > 1 {
-        said += &format!(". The joints do not lag alike: {}", lag::in_words(&groups));
-    }
-    said += &with_speed(measured, desired, step).unwrap_or_default();
+    let said = match untold(&lag, step) {
+        Some(why) => why,
+        None if lag.interval[1] < 0.0 && lag.seconds < 0.0 => early(&lag, step, turns(measured), columns),
+        None => late(&lag, &lag::groups(told, did)) + &with_speed(measured, desired, step).unwrap_or_default(),
+    };
     notes.why(line, said);
+}
+
+/// Why the motion does not tell the lag; `step`: from row to row [s].
+fn untold(lag: &Lag, step: f64) -> Option<String> {
+    let [ms, low, high] = milliseconds(lag);
+    let fits = format!("any from {low} to {high} ms fits about as well; nothing is shifted");
+    let far = LEAD.max(LEAD_ROWS * step);
+    if lag.repeats && lag.correlation >= CLEAR {
+        Some(format!(
+            "this motion repeats itself, so that it does not tell the lag between commands and states: {ms} ms fits, and so do \
+             others between {low} and {high} ms; nothing is shifted. A motion that does not repeat itself tells it"
+        ))
+    } else if lag.open {
+        Some(format!(
+            "this motion does not tell the lag between commands and states: {fits}. A motion that goes forth and back tells it"
+        ))
+    } else if lag.correlation < CLEAR {
+        Some(format!("the arm does not clearly follow its commands (correlation {:.2} at best)", lag.correlation))
+    } else if lag.interval[0] < -far && lag.interval[1] > far {
+        Some(format!(
+            "this motion does not tell whether the arm leads its commands or follows them: {fits}. A faster motion that goes forth \
+             and back tells it"
+        ))
+    } else {
+        None
+    }
+}
+
+/// An arm that leads its commands, which are shifted where that is sure.
+fn early(lag: &Lag, step: f64, turns: bool, columns: &mut JointColumns) -> String {
+    let [ms, low, high] = milliseconds(&Lag { seconds: -lag.seconds, ..*lag });
+    let early = format!("the arm moves {ms} ms before its commands (95 % {low} to {high} ms), which no arm does");
+    let shift = meant(lag);
+    if lag.seconds > -ROWS_LATE * step {
+        format!(
+            "{early}: that is less than two rows, as commands that are logged a row late show it. Nothing is shifted; {shift} here \
+             shifts them"
+        )
+    } else if turns {
+        columns.shift = shift;
+        format!("{early}: the commands were stamped by another clock")
+    } else {
+        format!(
+            "{early}: the commands were stamped by another clock. The motion goes one way only, where a lead and an arm that is \
+             ahead look alike: nothing is shifted; {shift} here shifts them"
+        )
+    }
+}
+
+fn late(lag: &Lag, groups: &[Group]) -> String {
+    let [ms, low, high] = milliseconds(lag);
+    let within = format!("95 % {low} to {high} ms, correlation {:.2}", lag.correlation);
+    let mut said = if ms.starts_with('-') {
+        format!("the arm follows its commands without a lag that shows ({ms} ms, {within}); nothing is shifted")
+    } else {
+        format!(
+            "the arm follows its commands by {ms} ms ({within}); nothing is shifted, since a delay is the twin's to explain"
+        )
+    };
+    if groups.len() > 1 {
+        said += &format!(". The joints do not lag alike: {}", lag::in_words(groups));
+    }
+    said
+}
+
+fn milliseconds(lag: &Lag) -> [String; 3] {
+    lag::milliseconds([lag.seconds, lag.interval[0], lag.interval[1]])
+}
+
+/// A lag [s] with one digit more than its interval tells.
+fn meant(lag: &Lag) -> f64 {
+    let half = 0.5 * (lag.interval[1] - lag.interval[0]);
+    let digits = (1.0 - half.max(FINEST).log10()).floor().clamp(0.0, 6.0);
+    let scale = 10f64.powf(digits);
+    (lag.seconds * scale).round() / scale
 }
 
 /// A lag that shrinks as the motion gets faster.
@@ -167,6 +208,39 @@ mod tests {
         assert!(by == 0.0 && told.contains("by 40 ms"), "{by} {told}");
         let (by, told) = shift(&moved(|t| wave(t + 0.1)), &desired);
         assert!((by + 0.1).abs() < 5e-3 && told.contains("another clock"), "{by} {told}");
+        // Between two rows, which are 2 ms apart, and in digits that mean something.
+        let (by, told) = shift(&moved(|t| wave(t + 0.045)), &desired);
+        assert!((by + 0.045).abs() < 5e-4 && format!("{by}").len() < 9, "{by} {told}");
+        let (by, told) = shift(&moved(|t| wave(t + 0.002)), &desired);
+        assert!(by == 0.0 && told.contains("2 ms before") && told.contains("less than two rows"), "{by} {told}");
+    }
+
+    #[test]
+    fn a_motion_that_repeats_itself_shifts_nothing() {
+        for lag in [0.03, 0.3] {
+            let wave = |t: f64| 0.3 * (4.0 * std::f64::consts::PI * t).sin();
+            let (by, told) = shift(&moved(|t| wave(t - lag)), &moved(wave));
+            assert!(by == 0.0 && told.contains("repeats itself"), "{by} {told}");
+        }
+    }
+
+    #[test]
+    fn rows_that_jump_away_and_back_hide_no_lag() {
+        let wave = |t: f64| (2.0 * t).sin() + 0.4 * (5.3 * t).sin();
+        let mut measured = moved(|t| wave(t - 0.04));
+        for row in [700, 2300, 5100] {
+            measured.q[0][row] += 0.9;
+        }
+        let (by, told) = shift(&measured, &moved(wave));
+        assert!(by == 0.0 && told.contains("by 40 ms"), "{by} {told}");
+    }
+
+    #[test]
+    fn an_interval_of_many_rows_either_way_is_no_lag() {
+        let lag = Lag { seconds: 0.01, interval: [-0.067, 0.032], correlation: 0.99, open: false, repeats: false };
+        let said = untold(&lag, 1e-3).expect("a reason");
+        assert!(said.contains("whether the arm leads") && said.contains("-67 to 32 ms"), "{said}");
+        assert_eq!(untold(&Lag { interval: [-0.002, 0.022], ..lag }, 1e-3), None);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::track::Track;
 use crate::clip::{Gravity, still};
 use crate::log::{Log, Table};
 use crate::mapping::{JointColumns, Torque};
-use crate::weight::{Finding, Moment, Weight};
+use crate::weight::{self, Finding, Moment, Weight};
 
 /// Moments that are compared.
 const MOMENTS: usize = 600;
@@ -41,6 +41,11 @@ pub(super) fn which(
         notes.why(line, format!("no model is known that could tell whether they hold gravity: {UNLESS}"));
         return;
     };
+    if let Some(why) = unmeasured(track) {
+        columns.torque = Torque::NotKnown;
+        notes.why(line, format!("{why}: {UNLESS}"));
+        return;
+    }
     let Some(weight) = Weight::of(&moments(track, &gravity)) else {
         notes.why(
             line,
@@ -50,8 +55,33 @@ pub(super) fn which(
         );
         return;
     };
-    let percent = |share: f64| format!("{:.0} %", share * 100.0);
-    let (torque, why) = match weight.finding(gravity.falls) {
+    let (torque, why) = meant(&weight, gravity.falls);
+    columns.torque = torque;
+    notes.why(line, why);
+}
+
+/// Joints whose torques nobody measured, beside others.
+fn unmeasured(track: &Track) -> Option<String> {
+    let joints: Vec<usize> = (0..track.tau.len()).filter(|joint| still(&[&track.tau[*joint]]).is_some()).collect();
+    let who = match joints.len() {
+        0 => return None,
+        1 => format!("the torque of {} holds", numbered(&joints)),
+        _ => format!("the torques of {} each hold", numbered(&joints)),
+    };
+    Some(format!("{who} one or two numbers in all rows, which no joint measures"))
+}
+
+/// Joints by their numbers from 1.
+fn numbered(joints: &[usize]) -> String {
+    let numbers: Vec<String> = joints.iter().map(|joint| (joint + 1).to_string()).collect();
+    format!("{} {}", if joints.len() == 1 { "joint" } else { "joints" }, numbers.join(", "))
+}
+
+/// Which torque it is by the weight in it, and why.
+fn meant(weight: &Weight, falls: [f64; 3]) -> (Torque, String) {
+    // Without the sign of a 0.
+    let percent = |share: f64| format!("{:.0} %", (share * 100.0).round() + 0.0);
+    match weight.finding(falls) {
         Finding::Whole(share) => {
             (Torque::WithGravity, format!("{} of the model's gravity shows in them", percent(share)))
         }
@@ -59,45 +89,67 @@ pub(super) fn which(
             Torque::WithGravity,
             format!(
                 "they hold the arm's weight, which pulls {}, and not as in the model: the base is mounted another way than the \
-                 model stands. Nothing is added; turn the base in the URDF by a fixed joint between its root link and the base",
-                weight.in_words()
+                 model stands{}. Nothing is added; turn the base in the URDF by a fixed joint between its root link and the base",
+                weight.in_words(),
+                weight.doubt(falls)
             ),
         ),
         Finding::Absent(share) => {
-            let [along, half] = [share, weight.share(gravity.falls)[1]].map(|v| 100.0 * v);
             let why = format!(
-                "{along:.0} % of the model's gravity shows in them (95 % within {half:.0} %), and no weight along any other axis of \
-                 the base: it was taken off"
+                "{} of the model's gravity shows in them (95 % within {}), and no weight along any other axis of the base: it was \
+                 taken off",
+                percent(share),
+                percent(weight.share(falls)[1])
             );
             (Torque::WithoutGravity, why)
         }
-        Finding::Turned(joint, factor) => (
+        Finding::Noise => (
             Torque::NotKnown,
             format!(
-                "the torque of joint {} is {factor:.2} times what holds it by the weight that the others show: it is counted the \
-                 other way round. Turn its sign in the log; until then {UNLESS}",
-                joint + 1
+                "nothing in them goes with the motion, neither weight nor friction nor inertia: they are not what moves this arm, \
+                 and {UNLESS}"
             ),
         ),
+        Finding::Turned(_, factor) => {
+            let turned: Vec<usize> = weight.turned(falls).into_iter().map(|(joint, _)| joint).collect();
+            let (who, its) = match turned.len() {
+                1 => (format!("the torque of {} is", numbered(&turned)), "it is counted"),
+                _ => (format!("the torques of {} are", numbered(&turned)), "they are counted"),
+            };
+            let why = format!(
+                "{who} {factor:.2} times what holds the model's weight, which others hold: {its} the other way round. Turn the \
+                 sign by a negative `tau_factor`; until then {UNLESS}"
+            );
+            (Torque::NotKnown, why)
+        }
         Finding::Scaled(joint, factor) => {
             let who =
                 joint.map_or_else(|| "they are".to_owned(), |joint| format!("the torque of joint {} is", joint + 1));
             let why = format!(
-                "{who} {factor:.3} times what holds the model's weight: another unit than N m, or a torque constant or gear ratio \
-                 is missing. Multiply in the log; until then {UNLESS}"
+                "{who} {} times what holds the model's weight: {}. Give `tau_factor`; until then {UNLESS}",
+                significant(factor),
+                weight::meaning(factor)
             );
             (Torque::NotKnown, why)
         }
-        Finding::Partly(share) => (
-            Torque::NotKnown,
-            format!("{} of the model's gravity shows in them, neither all nor none: {UNLESS}", percent(share)),
-        ),
+        Finding::Partly(share) => {
+            let some = (share - 1.0).abs() < HALF_OF_IT;
+            let not = if some { "but not in those of all joints" } else { "neither all nor none" };
+            (Torque::NotKnown, format!("{} of the model's gravity shows in them, {not}: {UNLESS}", percent(share)))
+        }
         Finding::NotTold => {
             (Torque::NotKnown, format!("this motion does not tell how much of the arm's weight they hold: {UNLESS}"))
         }
-    };
-    columns.torque = torque;
-    notes.why(line, why);
+    }
+}
+
+/// A share of the weight that is nearer to all of it than this is not between all and none [1].
+const HALF_OF_IT: f64 = 0.4;
+
+/// A factor with three digits that mean something.
+fn significant(factor: f64) -> String {
+    let digits = (2.0 - factor.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
+    format!("{factor:.digits$}")
 }
 
 /// What an arm was told beside its gravity: known of a Franka alone.
@@ -131,8 +183,9 @@ fn moments(track: &Track, gravity: &Gravity) -> Vec<Moment> {
         let holds = [0, 1, 2].map(|axis| (gravity.holds)(&now, unit(axis)));
         let [Some(x), Some(y), Some(z)] = holds else { return None };
         let tau = track.tau.iter().map(|tau| tau[*row]).collect();
+        let motion = (gravity.moves)(&now, &dq, &ddq).unwrap_or_default();
         // Both ends of the log have no velocity.
-        ddq.iter().all(|v| v.is_finite()).then_some(Moment { tau, holds: [x, y, z], dq, ddq })
+        ddq.iter().all(|v| v.is_finite()).then_some(Moment { tau, holds: [x, y, z], motion, dq, ddq })
     };
     rows.iter().enumerate().filter_map(moment).collect()
 }
@@ -142,6 +195,8 @@ mod tests {
     use super::*;
     use crate::log::Column;
 
+    const INERTIA: [f64; 2] = [0.9, 0.2];
+
     /// Two joints that lean about the base's y, one on the other: first moments of mass [kg m].
     fn model() -> Gravity {
         let holds = |q: &[f64], a: [f64; 3]| {
@@ -149,16 +204,23 @@ mod tests {
             let pull = |(sin, cos): (f64, f64)| -(cos * a[0] - sin * a[2]);
             Some(vec![2.0 * pull(first) + 0.8 * pull(second), 0.8 * pull(second)])
         };
-        Gravity { falls: [0.0, 0.0, -9.81], holds: Box::new(holds) }
+        // Two links that turn about one axis each, without coupling.
+        let moves = |_: &[f64], _: &[f64], ddq: &[f64]| Some(vec![INERTIA[0] * ddq[0], INERTIA[1] * ddq[1]]);
+        Gravity { falls: [0.0, 0.0, -9.81], holds: Box::new(holds), moves: Box::new(moves) }
     }
 
     fn proposed(change: impl Fn(&[f64], &Gravity) -> Vec<f64>) -> (Torque, String) {
+        proposed_of(change, 0.3)
+    }
+
+    /// `dry`: friction [N m].
+    fn proposed_of(change: impl Fn(&[f64], &Gravity) -> Vec<f64>, dry: f64) -> (Torque, String) {
         let t: Vec<f64> = (0..1500).map(|i| f64::from(i) * 1e-2).collect();
         let wave = |w: f64| t.iter().map(|t| 1.1 * (w * t).sin()).collect::<Vec<f64>>();
         let q = vec![wave(0.7), wave(1.3)];
         let rows: Vec<Vec<f64>> = (0..t.len()).map(|row| change(&[q[0][row], q[1][row]], &model())).collect();
         // Dry friction.
-        let friction = |joint: usize, row: usize| 0.3 * [0.7, 1.3].map(|w| (w * t[row]).cos().signum())[joint];
+        let friction = |joint: usize, row: usize| dry * [0.7, 1.3].map(|w| (w * t[row]).cos().signum())[joint];
         let tau = |joint: usize| (0..t.len()).map(|row| rows[row][joint] + friction(joint, row)).collect();
         let track = Track { tau: vec![tau(0), tau(1)], q, t, ..Track::default() };
         let (mut columns, mut notes) = (JointColumns::default(), Notes::default());
@@ -195,6 +257,20 @@ mod tests {
         );
         let (torque, why) = changed([20.0, 20.0]);
         assert!(torque == Torque::NotKnown && why.contains("torque constant"), "{why}");
+    }
+
+    #[test]
+    fn noise_holds_no_gravity_that_was_taken_off_and_a_dead_joint_is_no_weight() {
+        let noise = |row: usize| (row as f64 * 12.9898).sin() * 43_758.545;
+        let count = std::cell::Cell::new(0);
+        let next = || {
+            count.set(count.get() + 1);
+            0.05 * (noise(count.get()).fract())
+        };
+        let (torque, why) = proposed_of(|_, _| vec![next(), next()], 0.0);
+        assert!(torque == Torque::NotKnown && why.contains("nothing in them goes with the motion"), "{why}");
+        let (torque, why) = proposed_of(|q, model| vec![model.torques(q).expect("a model")[0], 0.0], 0.0);
+        assert!(torque == Torque::NotKnown && why.contains("the torque of joint 2 holds one or two"), "{why}");
     }
 
     #[test]
