@@ -26,6 +26,14 @@ pub struct Lag {
     pub rate: f64,
 }
 
+impl Lag {
+    /// Whether the interval holds leads and lags that would both matter.
+    #[must_use]
+    pub fn tells_neither(&self) -> bool {
+        self.interval[0] < -LEAD && self.interval[1] > LEAD
+    }
+}
+
 /// Both topics where both move.
 fn motions(clip: &Columns) -> Option<[Motion<'_>; 2]> {
     let (measured, desired) = (&clip.measured, &clip.desired);

@@ -37,6 +37,9 @@ pub(super) const JUMP_BACK: f64 = 0.3;
 /// ...at least so often in a clip, and in this share of its rows [1]. Fewer are single spoilt rows.
 pub(super) const JUMPS: usize = 5;
 pub(super) const JUMP_SHARE: f64 = 2e-3;
+/// Fewer are remarked alone where they are this far [rad], and this many times as far as 99 of 100 rows move [1].
+pub(super) const SPIKE: f64 = 0.05;
+pub(super) const SPIKE_MOTION: f64 = 5.0;
 /// Rows of two publishers take turns for this many seconds at least, one after the other, with this many jumps in each...
 pub(super) const TURNS_LAST: usize = 2;
 pub(super) const TURNS_A_SECOND: usize = 2;
@@ -49,6 +52,8 @@ pub(super) const SAME_SIDE: f64 = 0.8;
 /// Commands are copies where this share of the rows of a moving arm [1] holds the measured positions to the bit, so many rows
 /// earlier or later at most.
 pub(super) const COPIED: f64 = 0.95;
+/// ...or, but for the step that they are rounded to, nearly all: an arm that follows well is within it now and then.
+pub(super) const COPIED_ROUNDED: f64 = 0.995;
 pub(super) const COPIED_WITHIN: usize = 20;
 
 /// Rows that repeat the one before to the bit while the joints move by more than so many steps of their encoders a row [1]...

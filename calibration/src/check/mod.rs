@@ -61,4 +61,4 @@ mod velocity;
 
 pub use remark::{Fault, Remark, Severity, Size};
 pub use session::{Checked, check, check_clips};
-pub(crate) use torque::motion;
+pub use torque::motion;

@@ -3,8 +3,8 @@
 
 use super::columns::{Columns, Signals};
 use super::limits::{
-    JUMP_BACK, JUMP_BACK_ROWS, JUMP_QUARTILES, JUMP_SHARE, JUMP_STEPS, JUMPS, SAME_SIDE, TURN_ROWS, TURNS_A_SECOND,
-    TURNS_ALIKE, TURNS_LAST,
+    JUMP_BACK, JUMP_BACK_ROWS, JUMP_QUARTILES, JUMP_SHARE, JUMP_STEPS, JUMPS, SAME_SIDE, SPIKE, SPIKE_MOTION,
+    TURN_ROWS, TURNS_A_SECOND, TURNS_ALIKE, TURNS_LAST,
 };
 use super::remark::{Fault, Remark, Severity, Size};
 use super::statistics::{median, quantile};
@@ -37,7 +37,7 @@ fn topic_remark(clip: &Columns, topic: &str, signals: &Signals) -> Option<Remark
     let (joint, jumps) = found.iter().enumerate().max_by_key(|(_, jumps)| jumps.len())?;
     let share = jumps.len() as f64 / signals.len() as f64;
     if jumps.len() < JUMPS || share < JUMP_SHARE || !of_two_arms(jumps) {
-        return None;
+        return spikes(clip, topic, signals, &found);
     }
     let others = found.iter().enumerate().filter(|(other, _)| *other != joint).map(|(_, jumps)| jumps.as_slice());
     let whole = last(jumps, &signals.t) && (signals.dof() == 1 || at_once(jumps, others));
@@ -62,6 +62,35 @@ fn topic_remark(clip: &Columns, topic: &str, signals: &Signals) -> Option<Remark
             .mended_by("look at those rows; with `ros2 topic info --verbose` at who publishes there")
             .weighed(Severity::Note)
     })
+}
+
+/// Single rows that lie where no joint goes: they were not measured.
+fn spikes(clip: &Columns, topic: &str, signals: &Signals, found: &[Vec<Jump>]) -> Option<Remark> {
+    let far = |(joint, jumps): (usize, &Vec<Jump>)| {
+        let mut steps: Vec<f64> = signals.q[joint].windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        let least = SPIKE.max(SPIKE_MOTION * quantile(&mut steps, 0.99));
+        let far = jumps.iter().filter(move |jump| jump.rows <= TURN_ROWS && jump.by.abs() > least);
+        far.map(move |jump| (joint, *jump)).collect::<Vec<_>>()
+    };
+    let all: Vec<(usize, Jump)> = found.iter().enumerate().flat_map(far).collect();
+    let (joint, first) = all.iter().min_by_key(|(_, jump)| jump.row).copied()?;
+    let mut rows: Vec<usize> = all.iter().map(|(_, jump)| jump.row).collect();
+    rows.sort_unstable();
+    rows.dedup();
+    let sizes: Vec<f64> = all.iter().map(|(_, jump)| jump.by.abs()).collect();
+    let what = format!(
+        "the {topic} positions jump away and back in {} of {} rows, {} first, by {:.2} rad: they were not measured there",
+        rows.len(),
+        signals.len(),
+        clip.joint(joint),
+        first.by.abs()
+    );
+    Some(
+        Remark::new(Fault::UnusableRows, &clip.file, topic, what)
+            .at(signals.t[first.row])
+            .sized(Size { value: median(sizes.clone()), interval: super::statistics::range(&sizes)?, unit: "rad" })
+            .mended_by("take those rows out of the log, and look at the driver if this repeats"),
+    )
 }
 
 /// Whether jumps are those of another arm's rows: short ones, and one after the other to the same side.

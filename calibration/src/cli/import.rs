@@ -1,7 +1,7 @@
 //! `calibration import`.
 
 use super::print;
-use crate::check::motion;
+use calibration::check::motion;
 use clap::Args;
 use import::{Arm, Gravity, Imported, Note, Order, Outcome, Rotors};
 use serde::Serialize;

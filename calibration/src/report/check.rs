@@ -67,6 +67,16 @@ pub fn words(found: &Checked) -> String {
             lines.push(format!("    mend: {}", remark.remedy));
         }
     }
+    let wide = |clip: &&ClipFacts| clip.lag.is_some_and(|lag| lag.tells_neither());
+    for clip in found.clips.iter().filter(wide) {
+        let [_, from, to] = clip.lag.map_or_else(Default::default, |lag| {
+            import::lag::milliseconds([lag.seconds, lag.interval[0], lag.interval[1]])
+        });
+        lines.push(format!(
+            "{}: this motion does not tell whether the arm leads its commands or follows them: any lag from {from} to {to} ms fits",
+            clip.file
+        ));
+    }
     for clip in found.clips.iter().filter(|clip| !clip.lag_groups.is_empty()) {
         lines.push(format!("{}: the joints do not lag alike: {}", clip.file, import::lag::in_words(&clip.lag_groups)));
     }

@@ -25,6 +25,7 @@ const PARTS: usize = 8;
 /// Tells the lag, and proposes a shift where commands come behind what they cause.
 pub(super) fn look(measured: &Track, desired: &Track, columns: &mut JointColumns, notes: &mut Notes) {
     let line = "desired.shift";
+    let [measured, desired] = [&measured.continuous(), &desired.continuous()];
     let (Some(first), Some(last)) = (measured.t.first(), measured.t.last()) else { return };
     if desired.t.first().is_none_or(|t| t > last) || desired.t.last().is_none_or(|t| t < first) {
         notes.why(

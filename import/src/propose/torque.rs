@@ -164,6 +164,7 @@ pub(super) fn desired(log: &Log, columns: &mut JointColumns, notes: &mut Notes) 
 
 /// Moments at which all joints have position, velocity, acceleration and torque.
 fn moments(track: &Track, gravity: &Gravity) -> Vec<Moment> {
+    let track = &track.continuous();
     let every = (track.t.len() / MOMENTS).max(1);
     let rows: Vec<usize> =
         (0..track.t.len()).step_by(every).filter(|row| track.tau.iter().all(|tau| tau[*row].is_finite())).collect();

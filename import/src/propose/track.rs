@@ -3,6 +3,7 @@
 use crate::log::{HEADER, Table};
 use crate::mapping::{Factor, JointColumns};
 use shared_mem::time::seconds_between;
+use std::f64::consts::TAU;
 
 /// Rows that are looked at: evenly taken ones of a longer log would hide fast motion, so its first are.
 const MOST_ROWS: usize = 60_000;
@@ -65,6 +66,20 @@ impl Track {
         Self { t: self.t[rows].to_vec(), q, ..Self::default() }
     }
 
+    /// The same without jumps by a whole turn, as a driver makes them that keeps its angles within one.
+    pub(super) fn continuous(&self) -> Self {
+        let unwrapped = |q: &Vec<f64>| {
+            let mut turns = 0.0;
+            let one = |(row, value): (usize, &f64)| {
+                let step = row.checked_sub(1).map_or(0.0, |before| value - q[before]);
+                turns -= turned(step);
+                value + turns * TAU
+            };
+            q.iter().enumerate().map(one).collect()
+        };
+        Self { q: self.q.iter().map(unwrapped).collect(), ..self.clone() }
+    }
+
     /// Slopes of a joint's positions, in the middle between the rows around each [1/s]; NaN at both ends.
     pub(super) fn slopes(&self, joint: usize) -> Vec<f64> {
         let q = &self.q[joint];
@@ -72,7 +87,8 @@ impl Track {
         for i in 1..q.len().saturating_sub(1) {
             let dt = self.t[i + 1] - self.t[i - 1];
             if dt > 0.0 {
-                slopes[i] = (q[i + 1] - q[i - 1]) / dt;
+                let step = q[i + 1] - q[i - 1];
+                slopes[i] = (step - turned(step) * TAU) / dt;
             }
         }
         slopes
@@ -96,8 +112,31 @@ impl Track {
     }
 }
 
+/// Whole turns in a step from row to row: 1, 0 or -1.
+fn turned(step: f64) -> f64 {
+    if (step.abs() - TAU).abs() < NEAR_TURN { step.signum() } else { 0.0 }
+}
+
+/// How near to a whole turn a step comes that is one [rad]: more than any joint moves between two rows, as in reading clips.
+const NEAR_TURN: f64 = 0.5;
+
 /// Root of the mean square of what is finite.
 pub(super) fn rms<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
     let (sum, count) = values.filter(|v| v.is_finite()).fold((0.0, 0), |(sum, count), v| (sum + v * v, count + 1));
     if count == 0 { 0.0 } else { (sum / f64::from(count)).sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_angle_that_is_kept_within_a_turn_goes_on_and_its_slope_stays() {
+        let t: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.05).collect();
+        let kept = |q: f64| (q + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
+        let track = Track { q: vec![t.iter().map(|t| kept(0.9 * t)).collect()], t, ..Track::default() };
+        let whole = track.continuous();
+        assert!(whole.q[0].iter().zip(&track.t).all(|(q, t)| (q - 0.9 * t).abs() < 1e-9));
+        assert!(track.slopes(0)[1..399].iter().all(|slope| (slope - 0.9).abs() < 1e-9));
+    }
 }

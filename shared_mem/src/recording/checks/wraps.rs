@@ -37,6 +37,38 @@ pub(super) fn unwrap(mut series: JointSeries, topic: &str, warnings: &mut Vec<St
     series.select_rows(&kept)
 }
 
+/// Puts commands into the turn of the joint that follows them, where they are whole turns away in all rows.
+pub(super) fn same_turn(desired: &mut JointSeries, measured: &JointSeries) -> Option<String> {
+    let dof = desired.dof;
+    if dof == 0 || measured.dof != dof || measured.is_empty() {
+        return None;
+    }
+    let turns_away = |joint: usize| {
+        let turns = desired.stamps_ns.iter().enumerate().map(|(row, stamp)| {
+            let near = measured.stamps_ns.partition_point(|other| other < stamp).min(measured.len() - 1);
+            let apart = desired.q[row * dof + joint] - measured.q[near * dof + joint];
+            let turns = (apart / TAU).round();
+            ((apart - turns * TAU).abs() < NEAR).then_some(turns)
+        });
+        let mut turns = turns.collect::<Option<Vec<f64>>>()?;
+        turns.dedup();
+        (turns.len() == 1).then(|| turns[0])
+    };
+    // Where any joint is elsewhere, in degrees or out of order, none is known to be turns away.
+    let turns: Vec<f64> = (0..dof).map(turns_away).collect::<Option<_>>()?;
+    let away: Vec<(usize, f64)> = turns.into_iter().enumerate().filter(|(_, turns)| *turns != 0.0).collect();
+    for (joint, turns) in &away {
+        desired.q.iter_mut().skip(*joint).step_by(dof).for_each(|q| *q -= turns * TAU);
+    }
+    let joints: Vec<String> = away.iter().map(|(joint, _)| (joint + 1).to_string()).collect();
+    (!away.is_empty()).then(|| {
+        format!(
+            "commands of joint {} lay whole turns from the measured positions and were put beside them",
+            joints.join(", ")
+        )
+    })
+}
+
 /// The row, when its velocity is more than half of what a turn between two samples makes.
 fn spoilt_row(series: &JointSeries, (row, joint): (usize, usize)) -> Option<usize> {
     let before = series.stamps_ns.get(row.checked_sub(1)?)?;
@@ -63,6 +95,12 @@ mod tests {
         assert_eq!(series.len(), n - 2, "two jumps in 12 rad");
         assert!(series.q.windows(2).all(|w| (0.29..0.61).contains(&(w[1] - w[0]))), "{:?}", series.q);
         assert!(series.dq.iter().all(|v| (v - 3.0).abs() < 1e-9));
+        let mut desired = series.clone();
+        desired.q.iter_mut().for_each(|q| *q += 0.1 - TAU);
+        let said = same_turn(&mut desired, &series).expect("a warning");
+        assert!(said.contains("joint 1"), "{said}");
+        assert!(desired.q.iter().zip(&series.q).all(|(a, b)| (a - b - 0.1).abs() < 1e-9));
+        assert_eq!(same_turn(&mut desired, &series), None);
         assert!(warnings[0].contains("2 times") && warnings[0].contains("2 rows"), "{warnings:?}");
     }
 }
