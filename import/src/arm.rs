@@ -12,6 +12,8 @@ use std::sync::Arc;
 pub struct Arm {
     /// Its joints, from base to flange.
     pub joints: Vec<String>,
+    /// The speeds that its description allows them [rad/s]; infinite where it does not say.
+    pub fastest: Vec<f64>,
     /// Joints of its description that move and are none of its own, such as fingers, with why, in words; empty where there are none.
     pub held: String,
     /// What its description says nothing of, and without which it could not move.

@@ -2,7 +2,7 @@
 //! those who describe the cell that it was recorded in, without importing it.
 
 use crate::error::ImportError;
-use crate::propose::propose;
+use crate::propose::{Known, propose};
 use crate::session::longest;
 use crate::sources::Found;
 use std::path::Path;
@@ -37,7 +37,7 @@ pub fn look(path: &Path) -> Result<Contents, ImportError> {
         return Err(found.refusal());
     }
     let log = longest(&logs, path)?;
-    let proposal = propose(log, (None, &[]), &|_| None).map_err(|what| ImportError::log(path, what))?;
+    let proposal = propose(log, Known::default(), &|_| None).map_err(|what| ImportError::log(path, what))?;
     let mapping = proposal.mapping;
     // A second publisher on a topic is a table of its own, behind a colon.
     let topic = |table: &str| table.split(':').next().unwrap_or(table).to_owned();

@@ -7,7 +7,7 @@ use crate::error::ImportError;
 use crate::log::{LeftOut, Log};
 use crate::mapping::{Mapping, Note, to_toml};
 use crate::pieces;
-use crate::propose::{Proposal, propose};
+use crate::propose::{Known, Proposal, propose, units_of};
 use crate::sources::Found;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
@@ -93,7 +93,21 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
     let given = order.cell.map(Cell::read).transpose()?;
     let mut first = None;
     let (mapping, notes) = match order.mapping {
-        Some(path) => (given_mapping(path)?, Vec::new()),
+        Some(path) => {
+            let mut mapping = Mapping::read(path)?.completed();
+            let mut notes = Vec::new();
+            // Units that no line names are proposed; what is asked before them is still open.
+            if mapping.open_line().is_some_and(|line| line.ends_with("_unit")) {
+                let (number, logs) = found.largest()?;
+                notes = units_of(longest(&logs, &found.paths()[number])?, &mut mapping);
+                first = Some((number, logs));
+            }
+            if let Some(line) = mapping.open_line() {
+                let what = format!("`{line}` is still to be filled in; its question stands above it");
+                return Err(ImportError::log(path, what));
+            }
+            (mapping, notes)
+        }
         None => {
             let (number, logs) = found.largest()?;
             let log = longest(&logs, &found.paths()[number])?;
@@ -166,16 +180,6 @@ fn with_left_out(mut notes: Vec<Note>, found: &Found) -> Vec<Note> {
     notes
 }
 
-fn given_mapping(path: &Path) -> Result<Mapping, ImportError> {
-    let mapping = Mapping::read(path)?.completed();
-    match mapping.open_line() {
-        Some(line) => {
-            Err(ImportError::log(path, format!("`{line}` is still to be filled in; its question stands above it")))
-        }
-        None => Ok(mapping),
-    }
-}
-
 pub(crate) fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, ImportError> {
     let rows = |log: &&Log| log.tables.iter().map(crate::log::Table::rows).max();
     let log = logs.iter().filter(|log| !log.is_empty()).max_by_key(rows);
@@ -200,23 +204,24 @@ fn cut(log: &Log, mapping: &mut Mapping, notes: &mut Vec<Note>) {
 fn proposal(log: &Log, given: Option<&Cell>, arms: Arms<'_>) -> Result<Proposal, ImportError> {
     let failed = |what: String| ImportError::log(&log.file, what);
     if let Some(cell) = given {
-        let named = || cell.robot.as_ref().map_or_else(Vec::new, |robot| robot.joints.clone());
-        let wanted = arms(cell, None).map_err(failed)?.map_or_else(named, |arm| arm.joints);
-        return propose(log, (given, &wanted), &|_| arms(cell, None).ok()??.gravity).map_err(failed);
+        let named = || (cell.robot.as_ref().map_or_else(Vec::new, |robot| robot.joints.clone()), Vec::new());
+        let (joints, fastest) = arms(cell, None).map_err(failed)?.map_or_else(named, |arm| (arm.joints, arm.fastest));
+        let known = Known { cell: given, joints: &joints, fastest: &fastest };
+        return propose(log, known, &|_| arms(cell, None).ok()??.gravity).map_err(failed);
     }
     let by_name = |joints: &[String]| {
         let cell = Cell::parse(&cell::proposed(log, joints, None), Path::new(CELL_TOML)).ok()?;
         arms(&cell, None).ok()??.gravity
     };
-    let plain = propose(log, (None, &[]), &by_name).map_err(failed)?;
+    let plain = propose(log, Known::default(), &by_name).map_err(failed)?;
     let (mut proposal, why) = match described(log, &plain.mapping.joints, arms) {
         Ok(None) => return Ok(plain),
-        Ok(Some((text, Arm { joints, held, rotors, .. }))) => {
+        Ok(Some((text, Arm { joints, fastest, held, rotors, .. }))) => {
             let gravity = |_: &[String]| arms(&Cell::default(), Some(&text)).ok()??.gravity;
             let held = if held.is_empty() { String::new() } else { format!("; held where they are: {held}") };
             let rotors = rotors.map_or_else(String::new, |rotors| format!("; {}", cell::stand_in(&rotors)));
             (
-                propose(log, (None, &joints), &gravity).map_err(failed)?,
+                propose(log, Known { joints: &joints, fastest: &fastest, cell: None }, &gravity).map_err(failed)?,
                 format!("the log's robot_description{held}{rotors}"),
             )
         }
@@ -432,6 +437,7 @@ mod tests {
             Some("broken") => Err("it is no URDF".into()),
             Some(_) => Ok(Some(Arm {
                 joints: vec!["shoulder".into(), "elbow".into()],
+                fastest: vec![],
                 held: "finger (named as a finger is)".into(),
                 rotors: None,
                 gravity: None,

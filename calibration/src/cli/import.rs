@@ -147,6 +147,7 @@ fn arm(cell: &Cell, urdf: Option<&str>) -> Result<Option<Arm>, String> {
     let without_inertia = model.joints_without_inertia().into_iter().map(str::to_owned).collect::<Vec<_>>();
     let rotor_inertia = model.rotor_inertia()[..model.dof()].to_vec();
     let rotors = (!without_inertia.is_empty()).then_some(Rotors { without_inertia, rotor_inertia });
+    let fastest = model.velocity_limit()[..model.dof()].to_vec();
     let shown = shown.map(Arc::new);
     let falls = model.free_fall();
     let moving = model.clone();
@@ -162,7 +163,7 @@ fn arm(cell: &Cell, urdf: Option<&str>) -> Result<Option<Arm>, String> {
                 .then(|| model.holding(&joints_from(q), falls).get(..q.len()).unwrap_or(&[]).to_vec())
         }),
     });
-    Ok(Some(Arm { joints, held, rotors, gravity, shown }))
+    Ok(Some(Arm { joints, fastest, held, rotors, gravity, shown }))
 }
 
 /// The same import, with a mapping.

@@ -104,8 +104,8 @@ block! {
     pub struct JointColumns {
         /// Columns of the positions, one a joint. Empty: not known yet.
         pub q: Vec<String>,
-        /// Their unit.
-        #[serde(default)]
+        /// Their unit; where no line says it, it is proposed.
+        #[serde(default = "AngleUnit::not_known")]
         pub q_unit: AngleUnit,
         /// What the positions are multiplied with, beside their unit.
         #[serde(default, skip_serializing_if = "Factor::is_one")]
@@ -171,6 +171,11 @@ impl Mapping {
         {
             desired.rate = measured.rate;
         }
+        if let (Some(measured), Some(desired)) = (&self.measured, &mut self.desired)
+            && desired.q_unit == AngleUnit::NotKnown
+        {
+            desired.q_unit = measured.q_unit;
+        }
         if self.joints.is_empty() {
             let count = self.measured.as_ref().map_or(0, |measured| measured.q.len());
             self.joints = (1..=count).map(|i| format!("joint{i}")).collect();
@@ -182,6 +187,7 @@ impl Mapping {
     #[must_use]
     pub fn open_line(&self) -> Option<&'static str> {
         let (measured, desired) = (self.measured.as_ref(), self.desired.as_ref());
+        let lacks_unit = |c: &JointColumns| c.q_unit == AngleUnit::NotKnown;
         let lacks_clock = |c: &JointColumns| c.stamps.is_none() && c.rate.is_none_or(|rate| rate <= 0.0);
         if measured.is_some_and(|m| m.q.is_empty()) {
             Some("[measured] q")
@@ -191,6 +197,10 @@ impl Mapping {
             Some("[measured] rate")
         } else if desired.is_some_and(lacks_clock) {
             Some("[desired] rate")
+        } else if measured.is_some_and(lacks_unit) {
+            Some("[measured] q_unit")
+        } else if desired.is_some_and(lacks_unit) {
+            Some("[desired] q_unit")
         } else if measured.is_none() && self.object.is_none() {
             Some("[measured] q")
         } else {

@@ -130,13 +130,19 @@ impl Text<'_> {
         self.entry(block, "table", &columns.table);
         self.clock(block, columns.clock());
         self.entry(block, "q", &columns.q);
-        self.entry(block, "q_unit", columns.q_unit);
+        // Of columns that are still asked for, nobody knows the units: they are proposed once those are there.
+        let is_open = columns.q.is_empty();
+        if !is_open {
+            self.entry(block, "q_unit", columns.q_unit);
+        }
         self.factor(block, "q_factor", &columns.q_factor);
         if !columns.sign.is_empty() {
             self.entry(block, "sign", &columns.sign);
         }
         self.entry(block, "dq", &columns.dq);
-        self.entry(block, "dq_unit", columns.dq_unit);
+        if !is_open {
+            self.entry(block, "dq_unit", columns.dq_unit);
+        }
         self.factor(block, "dq_factor", &columns.dq_factor);
         self.entry(block, "tau", &columns.tau);
         self.factor(block, "tau_factor", &columns.tau_factor);

@@ -35,6 +35,9 @@ pub enum AngleUnit {
     /// A joint that slides.
     #[serde(rename = "mm")]
     Millimetre,
+    /// To be proposed from the numbers, or to be asked for.
+    #[serde(rename = "not_known")]
+    NotKnown,
 }
 
 /// Unit of velocities of a joint.
@@ -118,11 +121,16 @@ impl TimeUnit {
 }
 
 impl AngleUnit {
+    /// That of a block that does not say it.
+    pub(crate) const fn not_known() -> Self {
+        Self::NotKnown
+    }
+
     /// One of it [rad], or [m].
     #[must_use]
     pub const fn si(self) -> f64 {
         match self {
-            Self::Radian | Self::Metre => 1.0,
+            Self::Radian | Self::Metre | Self::NotKnown => 1.0,
             Self::Degree => TAU / 360.0,
             Self::Turn => TAU,
             Self::Millimetre => 1e-3,
@@ -133,7 +141,7 @@ impl AngleUnit {
     #[must_use]
     pub const fn per_second(self) -> RateUnit {
         match self {
-            Self::Radian | Self::Turn => RateUnit::RadianPerSecond,
+            Self::Radian | Self::Turn | Self::NotKnown => RateUnit::RadianPerSecond,
             Self::Degree => RateUnit::DegreePerSecond,
             Self::Metre => RateUnit::MetrePerSecond,
             Self::Millimetre => RateUnit::MillimetrePerSecond,

@@ -23,6 +23,8 @@ pub(super) struct Candidate<'a> {
 #[derive(Debug, Default)]
 pub(super) struct Found<'a> {
     pub(super) candidates: Vec<Candidate<'a>>,
+    /// Groups whose names say nothing, or a velocity: their numbers may say that they are commands.
+    pub(super) unnamed: Vec<Candidate<'a>>,
     /// Quantities by their name that are none, with the reason.
     pub(super) refused: Vec<String>,
     /// Joints that are none of an arm's.
@@ -85,16 +87,27 @@ pub(super) fn find<'a>(log: &'a Log, wanted: &[String]) -> Found<'a> {
     for table in log.tables.iter().filter(|table| table.rows() > 1) {
         let groups = naming::groups(table);
         let circles = sines(table, &groups);
+        let all = groups.clone();
         for (number, group) in groups.into_iter().enumerate() {
-            let Some(role) = naming::role(&table.name, &group) else { continue };
+            let Some(role) = naming::role(&table.name, &group) else {
+                found.unnamed.extend(nameless(table, group));
+                continue;
+            };
             let group = without_apart(group, wanted, &mut apart);
             if group.names.is_empty() {
                 continue;
             }
             let candidate = Candidate { table, group, role };
-            match no_joints(&candidate, wanted, circles.contains(&number)) {
+            let is_point = is_point(&candidate, &all)
+                .then_some("a point in space, since what says how it is turned stands beside it");
+            match is_point.or_else(|| no_joints(&candidate, wanted, circles.contains(&number))) {
                 Some(why) => found.refused.push(format!("{}: {why}", candidate.named())),
-                None => found.candidates.push(candidate),
+                None => {
+                    if candidate.is(Quantity::Velocity, false) {
+                        found.unnamed.push(candidate.clone());
+                    }
+                    found.candidates.push(candidate);
+                }
             }
         }
     }
@@ -104,6 +117,25 @@ pub(super) fn find<'a>(log: &'a Log, wanted: &[String]) -> Found<'a> {
     }
     found.apart = apart.into_iter().collect();
     found
+}
+
+/// A group that names do not explain, as it may be positions by its numbers.
+fn nameless(table: &Table, group: Group) -> Option<Candidate<'_>> {
+    let is_other = !naming::may_serve(&group.base) || naming::is_time(&group.base) || naming::is_pose(&group.base);
+    let role = Role { quantity: Quantity::Position, desired: false, score: 0 };
+    (!is_other && group.names.len() > 1 && !naming::are_pose(&group.labels)).then_some(Candidate { table, group, role })
+}
+
+/// Whether three positions are a point in space: beside them stands how something is turned.
+fn is_point(candidate: &Candidate<'_>, all: &[Group]) -> bool {
+    let is_turn = |group: &Group| {
+        let alike = group.base.rsplit_once(['.', '/']).map_or("", |(parent, _)| parent) == candidate.parent();
+        naming::is_turn(&group.base) && (3..=4).contains(&group.names.len()) && alike
+    };
+    candidate.size() == 3
+        && candidate.joints().is_none()
+        && candidate.role.quantity == Quantity::Position
+        && all.iter().any(is_turn)
 }
 
 /// A sentence about columns of one number each that are a pose together: `x`, `y`, `z`, `rx`, `ry`, `rz`.

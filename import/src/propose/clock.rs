@@ -1,8 +1,10 @@
 //! Where a table's stamps are, and in which unit.
 
 use super::Notes;
+use super::follow;
+use super::track::Track;
 use crate::log::{Column, HEADER, Log, Table};
-use crate::mapping::TimeUnit;
+use crate::mapping::{JointColumns, TimeUnit};
 use crate::naming;
 
 /// Rows of a robot's log come between these rates [Hz]; a thousand apart, so that one unit alone fits.
@@ -12,6 +14,12 @@ const FASTEST: f64 = 4000.0;
 const SAME_STEP: f64 = 0.25;
 /// So many steps show that they are the same.
 const FEWEST_STEPS: usize = 20;
+/// Rates at which robots are logged [Hz], and how near one has to be [1].
+const USUAL_RATES: [f64; 18] = [
+    10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 100.0, 120.0, 125.0, 200.0, 240.0, 250.0, 400.0, 500.0, 800.0,
+    1000.0,
+];
+const NEAR_RATE: f64 = 0.02;
 const UNITS: [(TimeUnit, &str); 4] = [
     (TimeUnit::Second, "seconds"),
     (TimeUnit::Millisecond, "milliseconds"),
@@ -42,6 +50,14 @@ pub(super) fn choose(log: &Log, table: &Table, block: &str, notes: &mut Notes) -
         notes.open(&format!("{block}.rate"), question);
         return Clock::default();
     };
+    if counts(log, column) {
+        let question = format!(
+            "`{}` counts 0, 1, 2: of milliseconds, or of rows? How many rows a second: 1000 where it is milliseconds",
+            column.name
+        );
+        notes.open(&format!("{block}.rate"), question);
+        return Clock::default();
+    }
     if !naming::is_time(&column.name) {
         let why = format!("`{}` rises by the same in every row, as a clock does and no joint", column.name);
         notes.why(&format!("{block}.stamps"), why);
@@ -53,8 +69,39 @@ pub(super) fn choose(log: &Log, table: &Table, block: &str, notes: &mut Notes) -
 }
 
 /// Whether a table has no stamps at all.
-pub(super) fn is_missing(table: &Table) -> bool {
-    table.stamps_ns.is_none() && column(table).is_none()
+pub(super) fn is_missing(log: &Log, table: &Table) -> bool {
+    table.stamps_ns.is_none() && column(table).is_none_or(|column| counts(log, column))
+}
+
+/// Whether a column counts from 0 or 1 on, one a row, and does not say what: rows, or milliseconds.
+fn counts(log: &Log, column: &Column) -> bool {
+    let starts = column.values.first().is_some_and(|first| *first == 0.0 || *first == 1.0);
+    let says = log.facts.stamp_unit.is_some() || naming::time_unit(&column.name).is_some();
+    starts && !says && column.values.windows(2).all(|w| w[1] - w[0] == 1.0)
+}
+
+/// Rows a second of a table whose stamps count rows, by velocities that are the slope of the positions; the question is then answered.
+pub(super) fn by_slope(table: &Table, columns: &JointColumns, notes: &mut Notes) -> Option<f64> {
+    let name = &column(table).filter(|_| columns.stamps.is_none() && columns.rate.is_none())?.name;
+    let track = Track::of(table, &JointColumns { rate: Some(1.0), ..columns.clone() })?;
+    if track.dq.is_empty() || !follow::is_slope(&track) {
+        return None;
+    }
+    let (mut product, mut square) = (0.0, 0.0);
+    for (joint, dq) in track.dq.iter().enumerate() {
+        for (slope, dq) in track.slopes(joint).iter().zip(dq).filter(|(s, v)| s.is_finite() && v.is_finite()) {
+            product += slope * dq;
+            square += slope * slope;
+        }
+    }
+    let rate = product / square;
+    let usual = USUAL_RATES.into_iter().find(|usual| (rate / usual - 1.0).abs() < NEAR_RATE)?;
+    notes.0.retain(|note| !(note.open && note.line.ends_with(".rate")));
+    notes.why(
+        "measured.rate",
+        format!("`{name}` counts rows: the velocities are the slope of the positions at {rate:.1} rows a second"),
+    );
+    Some(usual)
 }
 
 /// The column of stamps: named so and rising, or, where none is, the only one that rises by the same in every row.
@@ -68,7 +115,8 @@ fn column(table: &Table) -> Option<&Column> {
     named.min_by_key(|column| (!is_header(&column.name), naming::words(&column.name).len())).or_else(|| ticking(table))
 }
 
-/// The only column that rises by the same in every row and counts no rows.
+/// The only column that rises by the same in every row, counts no rows and has no others of its kind: a joint that turns at one speed
+/// stands among joints.
 fn ticking(table: &Table) -> Option<&Column> {
     let ticks = |column: &&Column| {
         let mut steps: Vec<f64> = column.values.windows(2).map(|w| w[1] - w[0]).collect();
@@ -82,7 +130,11 @@ fn ticking(table: &Table) -> Option<&Column> {
             && !counts
     };
     let mut ticking = table.columns.iter().filter(ticks);
-    ticking.next().filter(|_| ticking.next().is_none())
+    let only = ticking.next().filter(|_| ticking.next().is_none())?;
+    let is_named = |group: &naming::Group| group.names.contains(&only.name) && !group.base.starts_with("column");
+    let groups = naming::groups(table);
+    let own = groups.iter().find(|group| is_named(group));
+    own.is_none_or(|group| group.names.len() == 1).then_some(only)
 }
 
 fn unit(log: &Log, name: &str, values: &[f64]) -> (TimeUnit, String) {
@@ -143,7 +195,7 @@ mod tests {
         let found = choose(&Log::default(), &table, "measured", &mut notes);
         assert_eq!((found.stamps.as_deref(), found.unit), (Some("Zeit [s]"), TimeUnit::Second), "{:?}", notes.0);
         table.columns.pop();
-        assert!(is_missing(&table), "a counter of rows is no clock");
+        assert!(is_missing(&Log::default(), &table), "a counter of rows is no clock");
         let mut notes = Notes::default();
         choose(&Log::default(), &Table::default(), "measured", &mut notes);
         assert!(notes.0[0].open && notes.0[0].line == "measured.rate");

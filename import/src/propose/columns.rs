@@ -36,7 +36,7 @@ pub(super) struct Chosen {
 /// # Errors
 /// A sentence where the log is one of another arm than the one whose joints are `wanted`.
 pub(super) fn choose(log: &Log, wanted: &[String], notes: &mut Notes) -> Result<Chosen, String> {
-    let Found { candidates, refused, apart } = candidates::find(log, wanted);
+    let Found { candidates, unnamed, refused, apart } = candidates::find(log, wanted);
     let all = Judged::all(log, &candidates);
     let asked =
         || all.iter().filter(|judged| !judged.candidate.role.desired).map(|j| j.candidate.table.name.clone()).next();
@@ -66,7 +66,8 @@ pub(super) fn choose(log: &Log, wanted: &[String], notes: &mut Notes) -> Result<
         measured: Some(block("measured", &measured, &members.places, notes)),
         ..Chosen::default()
     };
-    match commands::choose(&all, (&measured, &members), notes) {
+    let nameless = Judged::unnamed(log, &unnamed, measured.candidate.size());
+    match commands::choose((&all, &nameless), (&measured, &members), notes) {
         commands::Found::These(command) => {
             chosen.desired = Some(block("desired", &command.judged, &command.places, notes));
             chosen.order_is_open = !command.in_order;

@@ -6,7 +6,7 @@ use super::follow::{self, Following};
 use super::judged::Judged;
 use super::members::{self, Members};
 use super::track::Track;
-use crate::naming::{Quantity, Role};
+use crate::naming::{self, Quantity, Role};
 
 /// A name of at least this score says by itself that it is a command: `q_d`, a topic of desired joints.
 const PLAIN_NAME: u32 = 3;
@@ -52,6 +52,12 @@ impl<'a> Command<'a> {
             Some(places) => places,
             None if size == measured.candidate.size() => members.places.clone(),
             None if size == members.places.len() => (0..size).collect(),
+            // Behind the joints may stand a gripper.
+            None if judged.candidate.joints().is_none()
+                && (size == members.places.len() + 1 || size == members.places.len() + 2) =>
+            {
+                (0..members.places.len()).collect()
+            }
             None => return None,
         };
         let of = |track: &Track, places: &[usize]| Track {
@@ -85,8 +91,9 @@ impl<'a> Command<'a> {
     }
 }
 
+/// `nameless`: groups whose names say nothing of positions.
 pub(super) fn choose<'a>(
-    all: &[Judged<'a>],
+    (all, nameless): (&[Judged<'a>], &[Judged<'a>]),
     (measured, members): (&Judged<'a>, &Members),
     notes: &mut Notes,
 ) -> Found<'a> {
@@ -95,7 +102,7 @@ pub(super) fn choose<'a>(
         named.iter().filter_map(|judged| Command::of(judged, measured, members)).collect();
     commands.sort_by_key(|command| std::cmp::Reverse((command.rank(), command.judged.candidate.table.rows())));
     let Some((best, rank)) = commands.first().and_then(|best| Some((best, best.rank()?))) else {
-        return unnamed(all, &named, (measured, members), notes);
+        return unnamed((all, nameless), &named, (measured, members), notes);
     };
     let rivals: Vec<&Command<'a>> = commands
         .iter()
@@ -126,17 +133,35 @@ pub(super) fn choose<'a>(
 /// Commands that no name gives away: a group that the joints follow, later. Where there is none either, and names say that there
 /// are commands, it is asked.
 fn unnamed<'a>(
-    all: &[Judged<'a>],
+    (all, nameless): (&[Judged<'a>], &[Judged<'a>]),
     named: &[&Judged<'a>],
     (measured, members): (&Judged<'a>, &Members),
     notes: &mut Notes,
 ) -> Found<'a> {
-    let leading = |judged: &&Judged<'a>| {
-        !judged.candidate.is_same(&measured.candidate)
-            && judged.candidate.is(Quantity::Position, false)
-            && judged.leads(measured)
+    let is_none = |judged: &&Judged<'a>| {
+        judged.candidate.is_same(&measured.candidate)
+            || judged.candidate.role.desired
+            || naming::is_derived(&judged.candidate.group.base)
     };
-    if let Some(command) = all.iter().find(leading).and_then(|judged| Command::of(judged, measured, members)) {
+    let leading: Vec<Command<'a>> = all
+        .iter()
+        .chain(nameless)
+        .filter(|judged| !is_none(judged) && judged.leads(measured))
+        .filter_map(|judged| Command::of(&judged.clone().without_those_of(measured), measured, members))
+        .collect();
+    let others: Vec<&Command<'a>> =
+        leading.iter().skip(1).filter(|other| other.judged.differs(&leading[0].judged)).collect();
+    if !others.is_empty() {
+        let names: Vec<String> = leading.iter().map(|command| command.judged.candidate.named()).collect();
+        let lines = leading.iter().map(|command| command.judged.candidate.line("q")).collect();
+        let what = format!(
+            "the joints go the same way as {}, later: which did the controller follow? {OR_NONE}",
+            names.join(" and ")
+        );
+        notes.ask(LINE, what, lines);
+        return Found::Open;
+    }
+    if let Some(command) = leading.into_iter().next() {
         notes.why(LINE, format!("{}: the joints go the same way, later", command.judged.candidate.named()));
         return Found::These(Box::new(command));
     }

@@ -48,6 +48,20 @@ impl<'a> Judged<'a> {
         positions.enumerate().map(|(number, q)| Self::of(log, candidates, q, number < MOST)).collect()
     }
 
+    /// Groups whose names say nothing of positions, by their numbers alone.
+    pub(super) fn unnamed(log: &Log, unnamed: &[Candidate<'a>], size: usize) -> Vec<Self> {
+        let fitting = unnamed.iter().filter(|c| c.size() == size).take(MOST);
+        fitting.map(|c| Self { velocities: Vec::new(), torques: Vec::new(), ..Self::of(log, &[], c, true) }).collect()
+    }
+
+    /// The same without the velocities and torques that another has taken.
+    pub(super) fn without_those_of(mut self, other: &Self) -> Self {
+        let is_taken = |own: &Candidate<'_>| other.velocities.iter().chain(&other.torques).any(|c| c.is_same(own));
+        self.velocities.retain(|own| !is_taken(own));
+        self.torques.retain(|own| !is_taken(own));
+        self
+    }
+
     fn of(log: &Log, candidates: &[Candidate<'a>], q: &Candidate<'a>, closely: bool) -> Self {
         let closely = closely && q.size() <= 2 * MAX_JOINTS;
         let with = |velocities: Option<&Candidate<'_>>| closely.then(|| track(log, q, velocities)).flatten();

@@ -3,7 +3,7 @@
 use super::Notes;
 use super::judged::Judged;
 use super::members;
-use crate::naming::Quantity;
+use crate::naming::{self, Quantity};
 use std::cmp::Reverse;
 
 /// Groups that are listed in a sentence.
@@ -44,14 +44,18 @@ pub(super) fn choose<'a>(
     let Some(mut best) = fitting.first().copied() else {
         return Err(no_positions(&misfits, wanted, &refused, notes));
     };
+    let first = best;
     let rivals: Vec<&Judged<'a>> =
         fitting.iter().skip(1).filter(|other| other.rank() == best.rank() && other.differs(best)).copied().collect();
-    // Of two that go the same way, the later one is what the arm did.
-    for rival in &rivals {
-        if best.leads(rival) {
-            best = rival;
+    // Of two that go the same way, the later one is what the arm did: whatever it is called, unless it says that it comes of the other.
+    for other in fitting.iter().skip(1) {
+        let derived =
+            naming::is_derived(&other.candidate.group.base) && !naming::is_derived(&best.candidate.group.base);
+        if !derived && best.leads(other) {
+            best = other;
         }
     }
+    let is_later = !best.candidate.is_same(&first.candidate);
     let mut equals =
         fitting.iter().filter(|other| !other.candidate.is_same(&best.candidate) && other.rank() == best.rank());
     if equals.any(|other| other.differs(best) && !other.leads(best)) {
@@ -69,7 +73,8 @@ pub(super) fn choose<'a>(
     }
     let others: Vec<&Judged<'a>> =
         fitting.into_iter().filter(|other| !other.candidate.is_same(&best.candidate)).take(LISTED).collect();
-    let mut why = format!("{}: {}", best.candidate.named(), best.why(&others));
+    let reason = if is_later { "the later one of those that go the same way" } else { best.why(&others) };
+    let mut why = format!("{}: {reason}", best.candidate.named());
     if !others.is_empty() {
         let there: Vec<String> = others.iter().map(|other| other.candidate.named()).collect();
         why += &format!("; also there: {}", there.join(", "));

@@ -36,7 +36,7 @@ mod units;
 
 use crate::clip::Gravity;
 use crate::log::{HEADER, Log, Table};
-use crate::mapping::{JointColumns, Mapping, Note, Pieces, RateUnit, TorquesAct};
+use crate::mapping::{AngleUnit, JointColumns, Mapping, Note, Pieces, RateUnit, TorquesAct};
 use columns::Chosen;
 use shared_mem::cell::{Cell, ClipKind};
 use track::Track;
@@ -72,14 +72,24 @@ impl Notes {
     }
 }
 
-/// Proposes what the columns of `log` are. `cell`: what the laboratory knows, where it was given; `wanted`: the arm's joints from base
-/// to flange, where they are known; `gravity`: the nominal model's, of the joints that were found.
+/// What is known before a log is looked at.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Known<'a> {
+    /// What the laboratory knows, where it was given.
+    pub(crate) cell: Option<&'a Cell>,
+    /// The arm's joints from base to flange; empty where they are not known.
+    pub(crate) joints: &'a [String],
+    /// The speeds that its description allows them [rad/s]; empty where it does not say.
+    pub(crate) fastest: &'a [f64],
+}
+
+/// Proposes what the columns of `log` are. `gravity`: the nominal model's, of the joints that were found.
 ///
 /// # Errors
 /// A sentence where the log is one of another arm.
 pub(crate) fn propose(
     log: &Log,
-    (cell, wanted): (Option<&Cell>, &[String]),
+    known: Known<'_>,
     gravity: &dyn Fn(&[String]) -> Option<Gravity>,
 ) -> Result<Proposal, String> {
     let mut notes = Notes::default();
@@ -87,7 +97,7 @@ pub(crate) fn propose(
         notes.why("log", runs.clone());
     }
     let (mut of_joints, mut of_object) = (Notes::default(), Notes::default());
-    let chosen = columns::choose(log, wanted, &mut of_joints)?;
+    let chosen = columns::choose(log, known.joints, &mut of_joints)?;
     let mut mapping = Mapping {
         kind: ClipKind::Excitation,
         pieces: Pieces::Whole,
@@ -103,8 +113,8 @@ pub(crate) fn propose(
         return Ok(Proposal { mapping, notes: notes.0 });
     }
     notes.0.extend(of_joints.0.into_iter().chain(of_object.0));
-    kind(&mut mapping, cell, &mut notes);
-    joints(log, &chosen, (&mut mapping, gravity), &mut notes);
+    kind(&mut mapping, known.cell, &mut notes);
+    joints(log, (&chosen, known), (&mut mapping, gravity), &mut notes);
     Ok(Proposal { mapping, notes: notes.0 })
 }
 
@@ -127,7 +137,12 @@ fn kind(mapping: &mut Mapping, cell: Option<&Cell>, notes: &mut Notes) {
 type Model<'a> = &'a dyn Fn(&[String]) -> Option<Gravity>;
 
 /// The two blocks of joints, with everything that their numbers tell.
-fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'_>), notes: &mut Notes) {
+fn joints(
+    log: &Log,
+    (chosen, known): (&Chosen, Known<'_>),
+    (mapping, gravity): (&mut Mapping, Model<'_>),
+    notes: &mut Notes,
+) {
     let mut measured = block(log, "measured", (chosen.measured.as_ref(), chosen.asked.as_deref()), notes);
     let mut desired = (chosen.desired.is_some() || chosen.commands_are_open).then(|| {
         if chosen.measured.is_none() {
@@ -138,13 +153,19 @@ fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'
         }
         block(log, "desired", (chosen.desired.as_ref(), Some(&measured.table)), notes)
     });
+    if let Some(rate) = log.table(&measured.table).and_then(|table| clock::by_slope(table, &measured, notes)) {
+        measured.rate = Some(rate);
+        if let Some(desired) = desired.as_mut().filter(|desired| desired.table == measured.table) {
+            desired.rate = Some(rate);
+        }
+    }
     for columns in std::iter::once(&mut measured).chain(&mut desired) {
         columns.torques_act =
             if log.facts.torques_end_at_rows { TorquesAct::UntilStamp } else { TorquesAct::FromStamp };
     }
     let track = |columns: &JointColumns| -> Option<Track> { Track::of(log.table(&columns.table)?, columns) };
     if let Some(rows) = track(&measured) {
-        units::measured(&rows, &mut measured, notes);
+        units::measured(&rows, known.fastest, &mut measured, notes);
         if let Some(desired) = &mut desired {
             if let Some(told) = track(desired) {
                 units::desired((&rows, &told), chosen.commands_factor, (&mut measured, desired), notes);
@@ -181,6 +202,27 @@ fn joints(log: &Log, chosen: &Chosen, (mapping, gravity): (&mut Mapping, Model<'
     }
     mapping.measured = Some(measured);
     mapping.desired = desired;
+}
+
+/// Proposes the units of blocks that a person filled in and that name none, with the reasons.
+pub(crate) fn units_of(log: &Log, mapping: &mut Mapping) -> Vec<Note> {
+    let mut notes = Notes::default();
+    let track = |columns: &JointColumns| -> Option<Track> { Track::of(log.table(&columns.table)?, columns) };
+    if let Some(measured) = &mut mapping.measured
+        && let Some(did) = track(measured)
+    {
+        let told = mapping.desired.as_ref().and_then(track);
+        let is_open = |columns: &JointColumns| columns.q_unit == AngleUnit::NotKnown;
+        let (own, other) = (is_open(measured), mapping.desired.as_ref().is_some_and(is_open));
+        units::unnamed((&did, told.as_ref()), (measured, mapping.desired.as_mut()), &mut notes);
+        if own {
+            velocities(log, "measured", measured, &mut notes);
+        }
+        if let Some(desired) = mapping.desired.as_mut().filter(|_| other) {
+            velocities(log, "desired", desired, &mut notes);
+        }
+    }
+    notes.0
 }
 
 /// Torques that nobody measured are none, whatever gravity shows in them.
@@ -235,7 +277,7 @@ fn block(
 
 fn set_clock(log: &Log, table: &Table, name: &str, columns: &mut JointColumns, notes: &mut Notes) {
     // Asked once: the measured block of the same table answers for both.
-    if name == "desired" && clock::is_missing(table) && log.tables.len() == 1 {
+    if name == "desired" && clock::is_missing(log, table) && log.tables.len() == 1 {
         return;
     }
     let clock = clock::choose(log, table, name, notes);

@@ -2,6 +2,7 @@
 
 use super::definition::{self, Arity, Field, Kind, Undefined};
 use super::flat::{Flat, Unread};
+use super::joined;
 use super::known;
 use super::wire::{Encoding, Reader};
 use crate::log::{Column, LeftOut, Table};
@@ -154,7 +155,7 @@ impl<'a> Collector<'a> {
             }));
             tables.extend(topic.tables(&name));
         }
-        (tables, left_out)
+        (joined::joined(tables), left_out)
     }
 }
 
@@ -188,7 +189,7 @@ impl Topic {
         (log_time_ns, is_last): (u64, bool),
     ) -> Result<(), Unread> {
         let again = reader.clone();
-        let flat = Flat::read(fields, reader, false, budget)?;
+        let mut flat = Flat::read(fields, reader, false, budget)?;
         if is_last && !reader.is_at_end() {
             return Err(Unread::Broken);
         }
@@ -200,14 +201,25 @@ impl Topic {
         let known = self.layouts.iter().position(|l| l.shape == flat.shape && l.texts == flat.texts);
         let at = match known {
             Some(at) => at,
-            None if self.layouts.len() >= MOST_LAYOUTS => {
-                self.leave_out(CROWDED);
-                return Ok(());
-            }
             None => {
                 let named = Flat::read(fields, &mut again.clone(), true, budget)?;
-                self.layouts.push(Layout::new(&named, budget)?);
-                self.layouts.len() - 1
+                budget.step(named.numbers.len() * self.layouts.len().max(1))?;
+                // Names in another order are the same joints.
+                let other = self.layouts.iter().enumerate().find_map(|(at, l)| Some((at, l.in_order(&named)?)));
+                match other {
+                    Some((at, numbers)) => {
+                        flat.numbers = numbers;
+                        at
+                    }
+                    None if self.layouts.len() >= MOST_LAYOUTS => {
+                        self.leave_out(CROWDED);
+                        return Ok(());
+                    }
+                    None => {
+                        self.layouts.push(Layout::new(&named, budget)?);
+                        self.layouts.len() - 1
+                    }
+                }
             }
         };
         if self.layouts.get(at).is_none_or(|layout| layout.kept.is_empty()) {
@@ -250,6 +262,20 @@ impl Layout {
             stamps_ns: Vec::new(),
             log_times_ns: Vec::new(),
         })
+    }
+
+    /// The numbers of a message in the order of this one's names, where it has the same names in another order.
+    fn in_order(&self, named: &Flat<'_>) -> Option<Vec<f64>> {
+        let is_alike = self.shape == named.shape
+            && self.texts.len() == named.texts.len()
+            && named.texts.iter().all(|text| self.texts.iter().any(|own| own == text));
+        if !is_alike {
+            return None;
+        }
+        let names = named.names();
+        let places: HashMap<&str, usize> = names.iter().enumerate().map(|(at, name)| (name.as_str(), at)).collect();
+        let one = |name: &String| named.numbers.get(*places.get(name.as_str())?).copied();
+        if places.len() == self.names.len() { self.names.iter().map(one).collect() } else { None }
     }
 
     fn push(&mut self, flat: &Flat<'_>, log_time_ns: u64) {

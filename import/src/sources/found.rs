@@ -2,9 +2,10 @@
 //! them along when it cannot be read, and neither does what is no log at all; both are named.
 
 use super::find::{self, Source};
-use super::table;
+use super::{stem, table};
 use crate::error::ImportError;
 use crate::log::Log;
+use crate::naming;
 use crate::runs;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -81,6 +82,9 @@ impl Found {
                 runs.entry(path.parent().unwrap_or(Path::new("")).to_owned()).or_default().push(number);
             }
         }
+        for (folder, numbers) in self.states_and_commands() {
+            runs.entry(folder).or_insert(numbers);
+        }
         for (folder, numbers) in runs.into_iter().filter(|(_, numbers)| numbers.len() > 1) {
             let files = numbers.iter().map(|number| self.places[*number].source.path().to_owned()).collect();
             let (first, others) = numbers.split_first().map_or((0, &[][..]), |(first, others)| (*first, others));
@@ -90,6 +94,20 @@ impl Found {
         }
         self.places.retain(|place| !place.is_out);
         Ok(())
+    }
+
+    /// Tables that are the states and the commands of one run by their names: `state.csv`, `command.csv`.
+    fn states_and_commands(&self) -> Vec<(PathBuf, Vec<usize>)> {
+        let mut runs: BTreeMap<(PathBuf, String), (Vec<usize>, Vec<usize>)> = BTreeMap::new();
+        for (number, place) in self.places.iter().enumerate() {
+            let Source::Table(path) = &place.source else { continue };
+            let Some((is_desired, rest)) = naming::of_file(&stem(path)) else { continue };
+            let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+            let (states, commands) = runs.entry((folder, rest)).or_default();
+            if is_desired { commands } else { states }.push(number);
+        }
+        let whole = runs.into_iter().filter(|(_, (states, commands))| states.len() == 1 && commands.len() == 1);
+        whole.map(|((folder, _), (states, commands))| (folder, [states, commands].concat())).collect()
     }
 
     /// How many there are.

@@ -1,9 +1,10 @@
-//! Tables of one topic each that were printed during one run (`rostopic echo -p`, `ros2 topic echo --csv`), as the log that they are
-//! together.
+//! Tables of one topic each that were printed during one run (`rostopic echo -p`, `ros2 topic echo --csv`), or that hold its states and
+//! its commands by their names, as the log that they are together.
 
 use super::{packed, stem, table};
 use crate::error::ImportError;
 use crate::log::{Log, Table};
+use crate::naming;
 use shared_mem::budget::Budget;
 use std::path::{Path, PathBuf};
 
@@ -48,14 +49,25 @@ pub(super) fn read(folder: &Path, files: &[PathBuf], budget: &Budget) -> Result<
     Ok(logs)
 }
 
-/// Whether tables with stamps of their own cover the same time.
+/// Whether tables cover the same time.
 fn of_one_run(tables: &[Table], others: &[Table]) -> bool {
     let span = |tables: &[Table]| {
-        let stamps = || tables.iter().filter_map(|table| table.stamps_ns.as_ref()).flatten();
-        stamps().min().zip(stamps().max()).map(|(first, last)| (*first as f64, *last as f64))
+        let all: Vec<(f64, f64)> = tables.iter().filter_map(time).collect();
+        all.into_iter().reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))
     };
     span(tables).zip(span(others)).is_some_and(|((a, b), (c, d))| {
         let shared = b.min(d) - a.max(c);
         shared > 0.0 && shared >= SHARE * (b - a).min(d - c)
     })
+}
+
+/// The first and last stamp of a table: its own [ns], or those of its column of time in the unit of that.
+fn time(table: &Table) -> Option<(f64, f64)> {
+    if let Some(stamps) = &table.stamps_ns {
+        return stamps.iter().min().zip(stamps.iter().max()).map(|(first, last)| (*first as f64, *last as f64));
+    }
+    let column = table.columns.iter().find(|column| naming::is_time(&column.name))?;
+    let finite = column.values.iter().copied().filter(|v| v.is_finite());
+    let (first, last) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    (first < last).then_some((first, last))
 }

@@ -5,9 +5,11 @@
 //! |---|---|
 //! | `cells` | rows and names (the only csv code) |
 //! | `echoed` | stamps as `rostopic echo -p` and `ros2 topic echo --csv` write them |
+//! | `long` | tables with a row of each joint |
 
 mod cells;
 mod echoed;
+mod long;
 
 pub(super) use echoed::may_be_echoed;
 
@@ -43,7 +45,9 @@ pub(super) struct Text {
 }
 
 pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
-    let Text { mut columns, stamps_ns, warnings, .. } = text(path, budget)?;
+    let mut table = text(path, budget)?;
+    long::by_joint(&mut table);
+    let Text { mut columns, stamps_ns, warnings, .. } = table;
     let franka = libfranka::recognise(&mut columns);
     Ok(Log {
         file: path.to_owned(),

@@ -1,7 +1,19 @@
 //! What the names of columns say: which of them belong together, and which quantity they may be.
 
+//!
+//! | file | owns |
+//! |---|---|
+//! | `words` | words of names, by what they say |
+//! | `label` | what of a name tells a column from its neighbours, and its unit |
+
+mod label;
+mod words;
+
+pub(crate) use label::{Unit, of_file, split, unit};
+
 use crate::log::Table;
 use std::collections::{HashMap, HashSet};
+use words::{DERIVED, DESIRED, MEASURED, MOTOR, OTHER, POSE, POSITION, TIME, TORQUE, TURNED, VELOCITY};
 
 /// Columns of one quantity: `q[0]` to `q[6]`, `joint1_pos` to `joint6_pos`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,139 +46,6 @@ pub(crate) struct Role {
     pub(crate) score: u32,
 }
 
-const VELOCITY: [&str; 10] = ["dq", "vel", "velocity", "velocities", "speed", "speeds", "qvel", "qdot", "qd", "vels"];
-const TORQUE: [&str; 10] =
-    ["tau", "effort", "efforts", "torque", "torques", "trq", "qfrc", "load", "moment", "moments"];
-/// With what is short for a joint or an axis in the logs of industrial arms.
-const POSITION: [&str; 24] = [
-    "q",
-    "pos",
-    "position",
-    "positions",
-    "qpos",
-    "jpos",
-    "posn",
-    "psn",
-    "angle",
-    "angles",
-    "ang",
-    "theta",
-    "joint",
-    "joints",
-    "jnt",
-    "jt",
-    "j",
-    "axis",
-    "axes",
-    "ax",
-    "state",
-    "action",
-    "dof",
-    "actions",
-];
-const DESIRED: [&str; 23] = [
-    "d",
-    "des",
-    "desired",
-    "cmd",
-    "cmnd",
-    "command",
-    "commands",
-    "commanded",
-    "target",
-    "targets",
-    "tgt",
-    "goal",
-    "ref",
-    "reference",
-    "action",
-    "actions",
-    "control",
-    "setpoint",
-    "setpoints",
-    "soll",
-    "planned",
-    "nominal",
-    "leader",
-];
-/// What a measurement is called.
-const MEASURED: [&str; 11] =
-    ["measured", "meas", "msr", "actual", "actl", "act", "feedback", "fbk", "ist", "encoder", "enc"];
-/// Words of angles before the gear.
-const MOTOR: [&str; 2] = ["motor", "rotor"];
-/// Words of where a hand is, or how it is turned; a joint has no such thing.
-const POSE: [&str; 12] =
-    ["pose", "quat", "quaternion", "orientation", "rotvec", "rpy", "euler", "xyz", "translation", "ee", "eef", "tcp"];
-/// Columns of these words are something else: external torques, tool poses, errors, second derivatives, gains, sines of angles.
-const OTHER: [&str; 60] = [
-    "ext",
-    "hat",
-    "filtered",
-    "error",
-    "errors",
-    "err",
-    "ddq",
-    "acc",
-    "accel",
-    "acceleration",
-    "accelerations",
-    "ee",
-    "eef",
-    "tcp",
-    "cartesian",
-    "wrench",
-    "force",
-    "forces",
-    "temp",
-    "temperature",
-    "temperatures",
-    "voltage",
-    "current",
-    "currents",
-    "collision",
-    "contact",
-    "covariance",
-    "dtau",
-    "dtheta",
-    "index",
-    "success",
-    "rate",
-    "count",
-    "mode",
-    "min",
-    "max",
-    "mean",
-    "std",
-    "lower",
-    "upper",
-    "limit",
-    "limits",
-    "elbow",
-    "dp",
-    "sin",
-    "cos",
-    "sine",
-    "cosine",
-    "stiffness",
-    "damping",
-    "gain",
-    "gains",
-    "kp",
-    "kd",
-    "ki",
-    "impedance",
-    "inertia",
-    "gravity",
-    "coriolis",
-    "friction",
-];
-/// Words at the end of a name that say what the joint before them did.
-const ENDINGS: [&str; 14] = [
-    "pos", "position", "angle", "q", "vel", "velocity", "dq", "effort", "torque", "tau", "cmd", "command", "target",
-    "goal",
-];
-const TIME: [&str; 9] = ["t", "time", "timestamp", "timestamps", "stamp", "stamps", "seconds", "duration", "times"];
-
 /// The words of a name, in small letters: `tau_J_d` has three.
 pub(crate) fn words(name: &str) -> Vec<String> {
     let mut words: Vec<String> = vec![String::new()];
@@ -187,28 +66,6 @@ pub(crate) fn words(name: &str) -> Vec<String> {
     words
 }
 
-/// Name without what tells it from its neighbours, and that.
-pub(crate) fn split(name: &str) -> (String, String) {
-    if let Some((base, label)) = name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
-        return (base.to_owned(), label.to_owned());
-    }
-    if let Some((joint, ending)) = name.rsplit_once(['.', '_', '/', ' '])
-        && ENDINGS.contains(&ending.to_ascii_lowercase().as_str())
-        && !joint.is_empty()
-        && !VELOCITY.contains(&joint)
-        && !TORQUE.contains(&joint)
-    {
-        return (ending.to_ascii_lowercase(), joint.to_owned());
-    }
-    let last = name.rfind(|c: char| c.is_ascii_digit());
-    if let Some(end) = last {
-        let start = name[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
-        let (head, tail) = (name[..start].trim_end_matches(['_', '.', '-', ' ']), &name[end + 1..]);
-        return (format!("{head}{tail}"), name[start..=end].to_owned());
-    }
-    (name.to_owned(), String::new())
-}
-
 /// Whether a column may be of any use; what certainly is something else takes no memory.
 pub(crate) fn may_serve(name: &str) -> bool {
     let (base, _) = split(name);
@@ -220,11 +77,12 @@ pub(crate) fn may_serve(name: &str) -> bool {
 /// Columns of a table by quantity, in the order they stand.
 pub(crate) fn groups(table: &Table) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
-    let mut first: HashMap<String, usize> = HashMap::new();
+    let mut first: HashMap<(String, Option<String>), usize> = HashMap::new();
     for (at, column) in table.columns.iter().enumerate() {
         let (base, label) = split(&column.name);
-        // Without a label a column stands by itself.
-        let known = first.get(&base).filter(|_| !label.is_empty());
+        // Without a label a column stands by itself; one in another unit is another quantity.
+        let key = (base.clone(), unit(&column.name).map(|unit| format!("{unit:?}")));
+        let known = first.get(&key).filter(|_| !label.is_empty());
         match known.and_then(|group| groups.get_mut(*group)) {
             Some(group) => {
                 group.labels.push(label);
@@ -232,7 +90,7 @@ pub(crate) fn groups(table: &Table) -> Vec<Group> {
                 group.at.push(at);
             }
             None => {
-                first.entry(base.clone()).or_insert(groups.len());
+                first.entry(key).or_insert(groups.len());
                 groups.push(Group { base, labels: vec![label], names: vec![column.name.clone()], at: vec![at] });
             }
         }
@@ -248,20 +106,29 @@ pub(crate) fn role(table: &str, group: &Group) -> Option<Role> {
     if is_pose(&group.base) || is_coordinate(&group.base) {
         return None;
     }
-    let own = words(&group.base);
-    let around = words(table);
+    let own = own_words(&group.base);
+    // `set` in a file's name is seldom a command.
+    let around: Vec<String> = words(table).into_iter().filter(|word| word != "set").collect();
     let has = |words: &[String], list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
-    let quantity = if has(&own, &VELOCITY) {
+    let desired = has(&own, &DESIRED) || has(&around, &DESIRED);
+    let measured = has(&own, &MEASURED);
+    let only = |list: &[&str]| own.len() == 1 && has(&own, list);
+    // A message of numbers alone is called by its topic: `/forward_position_controller/commands`.
+    let by_topic = own == ["data"] && desired;
+    let quantity = if has(&own, &VELOCITY) || (by_topic && has(&around, &VELOCITY)) {
         Quantity::Velocity
-    } else if has(&own, &TORQUE) {
+    } else if has(&own, &TORQUE) || (by_topic && has(&around, &TORQUE)) {
         Quantity::Torque
-    } else if has(&own, &POSITION) || own == ["cmd"] || own == ["command"] || own == ["target"] || own == ["goal"] {
+    } else if has(&own, &POSITION) || only(&["cmd", "command", "target", "goal"]) || by_topic {
         Quantity::Position
     } else {
-        return None;
+        match group.names.first().and_then(|name| unit(name)) {
+            Some(Unit::Radian | Unit::Degree | Unit::Turn) if measured || desired => Quantity::Position,
+            Some(Unit::Rate) if measured || desired => Quantity::Velocity,
+            Some(Unit::NewtonMetre) => Quantity::Torque,
+            _ => return None,
+        }
     };
-    let own_desired = has(&own, &DESIRED);
-    let desired = own_desired || has(&around, &DESIRED);
     let mut score = 1;
     // The plain names of robotics, and what a publisher calls its own.
     score += 4 * u32::from(matches!(
@@ -269,11 +136,39 @@ pub(crate) fn role(table: &str, group: &Group) -> Option<Role> {
         "q" | "dq" | "tau_J" | "q_d" | "dq_d" | "tau_J_d"
     ));
     score += 2 * u32::from(has(&around, &["measured", "desired"]));
-    score += u32::from(has(&own, &MEASURED));
+    // What says that it was measured is that, even beside a plain `q`.
+    score += if quantity == Quantity::Position { 5 } else { 1 } * u32::from(measured && !desired);
     score += u32::from(own.iter().any(|word| word == "state") || has(&around, &["state", "states"]));
     score +=
         u32::from(matches!(group.base.as_str(), "position" | "velocity" | "effort" | "observation.state" | "action"));
-    Some(Role { quantity, desired, score: score.saturating_sub(u32::from(has(&own, &MOTOR))) })
+    let less = u32::from(has(&own, &MOTOR)) + u32::from(has(&own, &DERIVED));
+    Some(Role { quantity, desired, score: score.saturating_sub(less) })
+}
+
+/// Whether a name says that its numbers come out of others, later or out of a model.
+pub(crate) fn is_derived(base: &str) -> bool {
+    words(base).iter().any(|word| DERIVED.contains(&word.as_str()))
+}
+
+/// Whether a name says how something is turned.
+pub(crate) fn is_turn(base: &str) -> bool {
+    words(base).iter().any(|word| TURNED.contains(&word.as_str()))
+}
+
+/// The words of a base, with what stands behind the `q` of one as a word of its own: `qdes`.
+fn own_words(base: &str) -> Vec<String> {
+    let mut own = words(base);
+    let behind: Vec<String> = own
+        .iter()
+        .filter_map(|word| word.strip_prefix('q').filter(|rest| rest.len() > 1))
+        .filter(|rest| DESIRED.contains(rest) || MEASURED.contains(rest))
+        .map(str::to_owned)
+        .collect();
+    if !behind.is_empty() {
+        own.push("q".into());
+    }
+    own.extend(behind);
+    own
 }
 
 /// Whether a name ends like one coordinate in space, which is no joint's.
