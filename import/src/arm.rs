@@ -1,11 +1,15 @@
 //! The arm of a log as whoever knows kinematics and dynamics tells of it: of the cell that was given, or of the description that
 //! the log holds itself.
 
-use crate::cell::{Rotors, is_franka};
+use crate::cell::{self, Rotors, is_franka};
 use crate::clip::Gravity;
+use crate::error::ImportError;
 use crate::log::Log;
+use crate::mapping::Note;
+use crate::propose::{Known, Proposal, propose};
 use shared_mem::cell::Cell;
 use shared_mem::recording::RobotModel;
+use std::path::Path;
 use std::sync::Arc;
 
 /// What is known of an arm.
@@ -41,4 +45,89 @@ pub(crate) fn described(log: &Log, joints: &[String], arms: Arms<'_>) -> Result<
         return Err(format!("the log holds no positions of its joints {}", missing.join(", ")));
     }
     Ok(Some((text.clone(), arm)))
+}
+
+/// The mapping by what is known of the arm: the one that was given, the log's own, or the one that its joints' names tell.
+pub(crate) fn proposal(log: &Log, given: Option<&Cell>, arms: Arms<'_>) -> Result<Proposal, ImportError> {
+    let failed = |what: String| ImportError::log(&log.file, what);
+    if let Some(cell) = given {
+        let named = || (cell.robot.as_ref().map_or_else(Vec::new, |robot| robot.joints.clone()), Vec::new());
+        let (joints, fastest) = arms(cell, None).map_err(failed)?.map_or_else(named, |arm| (arm.joints, arm.fastest));
+        let known = Known { cell: given, joints: &joints, fastest: &fastest };
+        return propose(log, known, &|_| arms(cell, None).ok()??.gravity).map_err(failed);
+    }
+    let by_name = |joints: &[String]| {
+        let cell = Cell::parse(&cell::proposed(log, joints, None), Path::new("cell.toml")).ok()?;
+        arms(&cell, None).ok()??.gravity
+    };
+    let plain = propose(log, Known::default(), &by_name).map_err(failed)?;
+    let (mut proposal, why) = match described(log, &plain.mapping.joints, arms) {
+        Ok(None) => return Ok(plain),
+        Ok(Some((text, Arm { joints, fastest, held, rotors, .. }))) => {
+            let gravity = |_: &[String]| arms(&Cell::default(), Some(&text)).ok()??.gravity;
+            let held = if held.is_empty() { String::new() } else { format!("; held where they are: {held}") };
+            let rotors = rotors.map_or_else(String::new, |rotors| format!("; {}", cell::stand_in(&rotors)));
+            (
+                propose(log, Known { joints: &joints, fastest: &fastest, cell: None }, &gravity).map_err(failed)?,
+                format!("the log's robot_description{held}{rotors}"),
+            )
+        }
+        Err(what) => (plain, format!("the log's robot_description is not used: {what}")),
+    };
+    proposal.notes.insert(0, Note { line: "robot".into(), why, open: false, instead: Vec::new() });
+    Ok(proposal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Column, Facts, Table};
+
+    /// Joint states in the order of the alphabet, as ROS programs publish them.
+    fn bag(description: &str) -> Log {
+        let column = |name: &str, speed: f64| Column {
+            name: name.into(),
+            values: (0..50).map(|row| (f64::from(row) * speed).sin()).collect(),
+        };
+        let stamps_ns = Some((0..50).map(|row| row * 20_000_000).collect());
+        let columns =
+            vec![column("position[elbow]", 0.05), column("position[finger]", 0.0), column("position[shoulder]", 0.1)];
+        Log {
+            name: "run".into(),
+            format: "ROS 2 bag",
+            tables: vec![Table { name: "/joint_states".into(), stamps_ns, columns }],
+            facts: Facts { description: Some(description.into()), ..Facts::default() },
+            ..Log::default()
+        }
+    }
+
+    fn arms(_: &Cell, urdf: Option<&str>) -> Result<Option<Arm>, String> {
+        match urdf {
+            Some("broken") => Err("it is no URDF".into()),
+            Some(_) => Ok(Some(Arm {
+                joints: vec!["shoulder".into(), "elbow".into()],
+                fastest: vec![],
+                held: "finger (named as a finger is)".into(),
+                rotors: None,
+                gravity: None,
+                shown: None,
+            })),
+            None => Ok(None),
+        }
+    }
+
+    #[test]
+    fn joints_come_in_the_order_of_the_arm_that_the_log_describes() {
+        let Proposal { mapping, notes } = proposal(&bag("<robot/>"), None, &arms).expect("a log");
+        assert_eq!(mapping.joints, ["shoulder", "elbow"]);
+        assert_eq!(mapping.measured.expect("columns").q, ["position[shoulder]", "position[elbow]"]);
+        assert!(notes[0].why.contains("robot_description") && notes[0].why.contains("finger"), "{notes:?}");
+    }
+
+    #[test]
+    fn a_description_of_no_use_is_said_and_the_joints_are_taken_as_they_are() {
+        let Proposal { mapping, notes } = proposal(&bag("broken"), None, &arms).expect("a log");
+        assert_eq!(mapping.joints, ["elbow", "shoulder"]);
+        assert!(notes[0].why.contains("not used: it is no URDF"), "{notes:?}");
+    }
 }

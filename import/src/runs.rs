@@ -35,12 +35,15 @@ const NANOSECONDS: [&str; 5] = ["ns", "nsec", "nsecs", "nanosec", "nanoseconds"]
 const BILLION: f64 = 1e9;
 /// Runs that are listed in a sentence.
 const LISTED: usize = 12;
+/// Stamps that begin anew do so within so many steps of the first one, and go on for so many rows.
+const NEAR_STEPS: f64 = 3.0;
+const FEWEST_ROWS: usize = 10;
 /// Seconds since 1970 are more than this from 2001 on, as no other column of whole numbers beside one of nanoseconds is.
 const RECENT: f64 = 1e9;
 
 /// Takes each log apart into its runs, and puts stamps of two columns together.
 pub(crate) fn apart(logs: Vec<Log>) -> Vec<Log> {
-    let mut all: Vec<Log> = logs.into_iter().flat_map(windows::apart).flat_map(by_run).collect();
+    let mut all: Vec<Log> = logs.into_iter().flat_map(windows::apart).flat_map(by_run).flat_map(by_stamps).collect();
     for log in &mut all {
         for table in log.tables.iter_mut().filter(|table| table.stamps_ns.is_none()) {
             if let Some((seconds, nanoseconds, stamps_ns)) = stamps(table) {
@@ -93,6 +96,47 @@ fn by_run(mut log: Log) -> Vec<Log> {
         (first.left_out, first.warnings) = (log.left_out, log.warnings);
     }
     parts
+}
+
+/// A log of each part of a table whose stamps begin anew, as files do that runs were appended to; else the log as it is.
+fn by_stamps(mut log: Log) -> Vec<Log> {
+    let [table] = log.tables.as_slice() else { return vec![log] };
+    let begins = table.columns.iter().filter(|column| naming::is_time(&column.name)).find_map(|c| begins(&c.values));
+    let Some(begins) = begins.filter(|_| table.stamps_ns.is_none()) else { return vec![log] };
+    let Some(table) = log.tables.pop() else { return vec![log] };
+    let count = begins.len();
+    log.facts.runs = Some(format!("its stamps begin anew: the file holds {count} runs, a clip of each"));
+    let ends = begins.iter().skip(1).copied().chain([table.rows()]);
+    let mut parts: Vec<Log> = begins
+        .iter()
+        .zip(ends)
+        .enumerate()
+        .map(|(number, (begin, end))| {
+            let cut =
+                |c: &Column| Column { name: c.name.clone(), values: c.values.get(*begin..end).unwrap_or(&[]).to_vec() };
+            let own =
+                Table { columns: table.columns.iter().map(cut).collect(), name: table.name.clone(), stamps_ns: None };
+            Log { name: format!("{}_{:03}", log.name, number + 1), tables: vec![own], ..log.without_numbers() }
+        })
+        .collect();
+    if let Some(first) = parts.first_mut() {
+        (first.left_out, first.warnings) = (log.left_out, log.warnings);
+    }
+    parts
+}
+
+/// The rows at which stamps begin, where they fall back to the first of them once or more and rise in between.
+fn begins(stamps: &[f64]) -> Option<Vec<usize>> {
+    let first = *stamps.first()?;
+    let falls: Vec<usize> = (1..stamps.len()).filter(|row| stamps[*row] < stamps[row - 1]).collect();
+    let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    let near = NEAR_STEPS * steps.get(steps.len() / 2)?;
+    let begins: Vec<usize> = std::iter::once(0).chain(falls).collect();
+    let ends = begins.iter().skip(1).copied().chain([stamps.len()]);
+    let is_long = begins.iter().zip(ends).all(|(begin, end)| end - begin >= FEWEST_ROWS);
+    let is_anew = begins.iter().all(|row| (stamps[*row] - first).abs() <= near);
+    (begins.len() > 1 && is_long && is_anew).then_some(begins)
 }
 
 /// The runs of a log, by what stands before the names of their columns. None, where what is numbered are parts of a robot.
@@ -194,6 +238,18 @@ mod tests {
         let parts = apart(vec![log(&demos)]);
         let columns: Vec<&str> = parts[1].tables[0].columns.iter().map(|column| column.name.as_str()).collect();
         assert_eq!((columns, parts[0].left_out[0].what.as_str()), (vec!["q[0]", "a"], "mask"));
+    }
+
+    #[test]
+    fn runs_that_were_appended_begin_with_their_stamps() {
+        let of = |of: fn(u32) -> f64| Column { name: "time".into(), values: (0..60).map(of).collect() };
+        assert_eq!(begins(&of(|k| 0.01 * f64::from(k % 20)).values), Some(vec![0, 20, 40]));
+        assert_eq!(begins(&of(f64::from).values), None);
+        assert_eq!(begins(&of(|k| f64::from(k / 2 * 2) - f64::from(k % 2)).values), None, "rows out of order");
+        let q = Column { name: "q".into(), values: (0..60).map(f64::from).collect() };
+        let table = Table { name: "rows".into(), columns: vec![of(|k| f64::from(k % 30)), q], ..Table::default() };
+        let logs = apart(vec![Log { name: "all".into(), tables: vec![table], ..Log::default() }]);
+        assert_eq!((logs.len(), logs[1].name.as_str(), logs[1].tables[0].columns[1].values[0]), (2, "all_002", 30.0));
     }
 
     #[test]

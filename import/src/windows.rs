@@ -2,9 +2,12 @@
 
 use crate::log::{Column, LeftOut, Log, Table};
 use crate::naming::{self, Group};
+use shared_mem::msg::MAX_JOINTS;
 
 /// More columns than any arm has joints; only those may be a motion in each row.
 const WIDE: usize = 16;
+/// So few rows are the joints of one arm.
+const JOINTS: std::ops::RangeInclusive<usize> = 3..=MAX_JOINTS;
 /// A motion goes on within a row when its steps there are so many times shorter than from row to row.
 const SMOOTHER: f64 = 0.5;
 
@@ -13,6 +16,9 @@ pub(crate) fn apart(mut log: Log) -> Vec<Log> {
     let Some(at) = log.tables.iter().position(|table| length(table).is_some()) else { return vec![log] };
     let table = log.tables.swap_remove(at);
     let Some(length) = length(&table) else { return vec![log] };
+    if JOINTS.contains(&table.rows()) {
+        return vec![turned(log, &table, length)];
+    }
     let (motions, others): (Vec<Group>, Vec<Group>) =
         naming::groups(&table).into_iter().partition(|group| group.names.len() == length);
     let count = table.rows();
@@ -38,6 +44,28 @@ pub(crate) fn apart(mut log: Log) -> Vec<Log> {
         (first.left_out, first.warnings) = (log.left_out, log.warnings);
     }
     logs
+}
+
+/// The log with a row of each joint turned into a column of each; what has as many rows as those have columns stands beside it.
+fn turned(mut log: Log, table: &Table, length: usize) -> Log {
+    let (joints, others): (Vec<Group>, Vec<Group>) =
+        naming::groups(table).into_iter().partition(|group| group.names.len() == length);
+    let of = |group: &Group| -> Vec<Column> {
+        let along =
+            |row: usize| group.at.iter().filter_map(|at| table.columns.get(*at)?.values.get(row)).copied().collect();
+        (0..table.rows()).map(|row| Column { name: format!("{}[{row}]", group.base), values: along(row) }).collect()
+    };
+    let mut columns: Vec<Column> = joints.iter().flat_map(of).collect();
+    let beside = log.tables.extract_if(.., |other| other.stamps_ns.is_none() && other.rows() == length);
+    columns.extend(beside.flat_map(|other| other.columns));
+    let why = "it is no row of numbers a joint, as the motions beside it are";
+    log.left_out.extend(others.into_iter().map(|group| LeftOut { what: group.base, why, count: 1 }));
+    log.warnings.push(format!(
+        "its arrays have a row of each of {} joints, and a column of each of {length} stamps",
+        table.rows()
+    ));
+    log.tables.insert(0, Table { name: table.name.clone(), stamps_ns: None, columns });
+    log
 }
 
 /// How many rows the motions in a table's rows have; `None` where they hold none.
@@ -93,6 +121,19 @@ mod tests {
         let [q1, time] = &logs[4].tables[0].columns[..] else { panic!("two columns") };
         assert_eq!((q1.name.as_str(), q1.values[7], q1.values.len()), ("q1", angle(4, 7), 30));
         assert_eq!((time.name.as_str(), time.values[7]), ("time", 0.14));
+    }
+
+    #[test]
+    fn a_row_of_each_joint_is_turned() {
+        let joint = |i: usize| Column { name: format!("q[{i}]"), values: (0..6).map(|row| angle(row, i)).collect() };
+        let wide = Table { name: "rows".into(), columns: (0..40).map(joint).collect(), ..Table::default() };
+        let stamps = Column { name: "t".into(), values: (0..40).map(f64::from).collect() };
+        let clock = Table { name: "rows of t".into(), columns: vec![stamps], ..Table::default() };
+        let logs = apart(Log { tables: vec![wide, clock], ..Log::default() });
+        let [only] = &logs[..] else { panic!("one log") };
+        let names: Vec<&str> = only.tables[0].columns.iter().map(|column| column.name.as_str()).collect();
+        assert_eq!((only.tables.len(), names), (1, vec!["q[0]", "q[1]", "q[2]", "q[3]", "q[4]", "q[5]", "t"]));
+        assert_eq!(only.tables[0].columns[4].values[30], angle(4, 30));
     }
 
     #[test]

@@ -73,7 +73,7 @@ fn messages_of_a_form_that_is_not_known_are_named_as_such() {
     let bag = place.path().join("odd.db3");
     std::fs::copy(fixture("rosbag2_sqlite3/rosbag2_sqlite3.db3"), &bag).expect("room");
     let database = Connection::open(&bag).expect("a bag");
-    database.execute("UPDATE messages SET data = x'00ff0000' || data", []).expect("room");
+    database.execute("UPDATE messages SET data = CAST(x'00ff0000' || data AS BLOB)", []).expect("room");
     drop(database);
     let line = refused(&bag);
     assert!(line.contains("in a form that is not known") && !line.contains("damaged"), "{line}");

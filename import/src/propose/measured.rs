@@ -56,9 +56,25 @@ pub(super) fn choose<'a>(
         }
     }
     let is_later = !best.candidate.is_same(&first.candidate);
-    let mut equals =
-        fitting.iter().filter(|other| !other.candidate.is_same(&best.candidate) && other.rank() == best.rank());
-    if equals.any(|other| other.differs(best) && !other.leads(best)) {
+    let ties = |best: &Judged<'a>| -> Vec<&Judged<'a>> {
+        let equal =
+            fitting.iter().filter(|other| !other.candidate.is_same(&best.candidate) && other.rank() == best.rank());
+        equal.filter(|other| other.differs(best) && !other.leads(best)).copied().collect()
+    };
+    // Commands beside one of them, for the same joints, name the arm.
+    let is_commanded = |judged: &Judged<'a>| {
+        let beside = |told: &&Judged<'a>| std::ptr::eq(told.candidate.table, judged.candidate.table);
+        let mut told = all.iter().filter(|told| told.candidate.role.desired).filter(beside);
+        judged.candidate.joints().is_some_and(|joints| told.any(|told| told.candidate.joints() == Some(joints)))
+    };
+    let tied = ties(best);
+    let commanded: Vec<&Judged<'a>> =
+        std::iter::once(best).chain(tied.iter().copied()).filter(|j| is_commanded(j)).collect();
+    let is_arm = !tied.is_empty() && commanded.len() == 1;
+    if is_arm {
+        best = commanded[0];
+    }
+    if !is_arm && !tied.is_empty() {
         let names: Vec<String> = std::iter::once(fitting[0]).chain(rivals).map(|j| j.candidate.named()).collect();
         let what = format!(
             "as much speaks for {}: which are the arm's positions? One name a joint, and the table above",
@@ -73,7 +89,13 @@ pub(super) fn choose<'a>(
     }
     let others: Vec<&Judged<'a>> =
         fitting.into_iter().filter(|other| !other.candidate.is_same(&best.candidate)).take(LISTED).collect();
-    let reason = if is_later { "the later one of those that go the same way" } else { best.why(&others) };
+    let reason = if is_arm {
+        "commands for the same joints stand beside it"
+    } else if is_later {
+        "the later one of those that go the same way"
+    } else {
+        best.why(&others)
+    };
     let mut why = format!("{}: {reason}", best.candidate.named());
     if !others.is_empty() {
         let there: Vec<String> = others.iter().map(|other| other.candidate.named()).collect();

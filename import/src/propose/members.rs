@@ -17,23 +17,22 @@ pub(super) struct Members {
     pub(super) why: String,
 }
 
-/// What names a column, or a joint: without case, and with its number.
+/// What names a column, or a joint: without case, and with its number, which may stand before the last word (`arm_1_joint`).
 struct Name {
     text: String,
     number: Option<u64>,
+    /// The name without its number.
+    stem: String,
 }
 
 impl Name {
     fn of(text: &str) -> Self {
-        let digits = text
-            .rfind(|c: char| !c.is_ascii_digit())
-            .map_or(0, |at| at + text[at..].chars().next().map_or(1, char::len_utf8));
-        Self { text: text.to_ascii_lowercase(), number: text[digits..].parse().ok() }
-    }
-
-    /// What stands before the number.
-    fn stem(&self) -> &str {
-        self.text.trim_end_matches(|c: char| c.is_ascii_digit())
+        let text = text.to_ascii_lowercase();
+        let end = text.rfind(|c: char| c.is_ascii_digit()).map_or(0, |at| at + 1);
+        let begin = text[..end].trim_end_matches(|c: char| c.is_ascii_digit()).len();
+        let number = text[begin..end].parse().ok();
+        let stem = if number.is_some() { format!("{}{}", &text[..begin], &text[end..]) } else { text.clone() };
+        Self { text, number, stem }
     }
 
     /// The same but for a prefix, as robots have in the names of a cell and not in those of a log.
@@ -115,8 +114,8 @@ pub(super) fn of(measured: &Candidate<'_>, wanted: &[String], commanded: &[&[Str
 /// Numbers name the order of joints where all have the same name before them.
 fn sort(places: &mut [usize], names: &[String]) {
     let name = |place: &usize| names.get(*place).map(|name| Name::of(name));
-    let first = places.first().and_then(name).map(|name| name.stem().to_owned());
-    let alike = |place: &usize| name(place).is_some_and(|n| n.number.is_some() && Some(n.stem()) == first.as_deref());
+    let first = places.first().and_then(name).map(|name| name.stem);
+    let alike = |place: &usize| name(place).is_some_and(|n| n.number.is_some() && Some(&n.stem) == first.as_ref());
     if places.iter().all(alike) {
         places.sort_by_key(|place| name(place).and_then(|name| name.number));
     }
@@ -130,9 +129,9 @@ fn families(names: &[String]) -> Vec<Vec<usize>> {
         if name.number.is_none() {
             continue;
         }
-        match families.iter_mut().find(|(stem, _)| stem == name.stem()) {
+        match families.iter_mut().find(|(stem, _)| *stem == name.stem) {
             Some((_, family)) => family.push(place),
-            None => families.push((name.stem().to_owned(), vec![place])),
+            None => families.push((name.stem, vec![place])),
         }
     }
     let arms = families.into_iter().map(|(_, family)| family);
@@ -166,6 +165,8 @@ mod tests {
         for (wanted, commanded) in [(&fr3[..], &[][..]), (&[], &[&turned[..]]), (&[], &[])] {
             assert_eq!(found(rover, wanted, commanded).as_deref(), Ok(&fr3[..]), "{wanted:?} {commanded:?}");
         }
+        let tiago = "wheel head_1_joint head_2_joint arm_1_joint arm_2_joint arm_3_joint arm_4_joint arm_5_joint torso";
+        assert_eq!(found(tiago, &[], &[]), Ok(names("arm_1_joint arm_2_joint arm_3_joint arm_4_joint arm_5_joint")));
         let two = "left_1 left_2 left_3 left_4 left_5 right_1 right_2 right_3 right_4 right_5";
         assert!(found(two, &[], &[]).is_err_and(|what| what.contains("10 joints")));
         assert_eq!(found(two, &names("right_2 right_1"), &[]), Ok(names("right_2 right_1")));

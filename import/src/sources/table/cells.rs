@@ -31,6 +31,19 @@ pub(super) struct Cells {
     pub(super) warnings: Vec<String>,
 }
 
+/// Lines of another number of columns than the others.
+#[derive(Default)]
+struct Odd {
+    bad: usize,
+    /// Line and columns of the first.
+    first_bad: Option<(u64, usize)>,
+    /// Those above the first row.
+    above: usize,
+    first_above: Option<(u64, usize)>,
+    /// One of those may be names of other columns.
+    is_misnamed: bool,
+}
+
 /// What a cell says by its form alone.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Form {
@@ -72,8 +85,9 @@ impl Cells {
         let delimiter = delimiter(&sample);
         let plain = plain(body, delimiter, budget)?;
         let mut cells = Self { width: width(&plain, delimiter), warnings, ..Self::default() };
-        cells.records(&plain, delimiter, budget)?;
+        let odd = cells.records(&plain, delimiter, budget)?;
         cells.find_names(&head, delimiter);
+        cells.leave_out(odd, delimiter)?;
         if cells.rows() == 0 {
             return Err("holds names of columns and no row".into());
         }
@@ -81,10 +95,10 @@ impl Cells {
     }
 
     /// Takes the rows of that width over; of the others there may be few.
-    fn records(&mut self, text: &str, delimiter: u8, budget: &Budget) -> Result<(), Refused> {
+    fn records(&mut self, text: &str, delimiter: u8, budget: &Budget) -> Result<Odd, Refused> {
         let mut reader = reader(text, delimiter);
         let mut record = csv::StringRecord::new();
-        let (mut bad, mut first_bad, mut is_misnamed) = (0, None, false);
+        let mut odd = Odd::default();
         while reader.read_record(&mut record).map_err(|error| format!("{:?}: it is damaged", error.kind()))? {
             if record.len() > MOST_COLUMNS {
                 let what = format!(
@@ -101,11 +115,16 @@ impl Cells {
             let lacking = self.width.saturating_sub(record.len());
             let is_lacking = lacking > usize::from(self.ends.is_empty());
             if !behind || is_lacking || lines > MOST_LINES {
-                // Names of other columns than there are, and no title.
-                is_misnamed |=
-                    self.ends.is_empty() && record.len() > 1 && record.iter().all(|cell| form(cell) == Form::Word);
-                bad += 1 + lines;
-                first_bad = first_bad.or(Some((record.position().map_or(0, csv::Position::line), record.len())));
+                let place = (record.position().map_or(0, csv::Position::line), record.len());
+                if self.ends.is_empty() {
+                    odd.above += 1 + lines;
+                    odd.first_above = odd.first_above.or(Some(place));
+                    // Names of other columns than there are, and no title.
+                    odd.is_misnamed |= record.len() > 1 && record.iter().all(|cell| form(cell) == Form::Word);
+                } else {
+                    odd.bad += 1 + lines;
+                    odd.first_bad = odd.first_bad.or(Some(place));
+                }
                 continue;
             }
             for cell in record.iter().chain(std::iter::repeat_n("", lacking)).take(self.width) {
@@ -113,10 +132,20 @@ impl Cells {
                 self.ends.push(self.text.len());
             }
         }
-        let Some((line, width)) = first_bad else { return Ok(()) };
+        Ok(odd)
+    }
+
+    /// Says which lines are left out: those above the names are a title.
+    fn leave_out(&mut self, mut odd: Odd, delimiter: u8) -> Result<(), Refused> {
+        if self.first > 0 && odd.above > 0 {
+            self.warnings.push(format!("{} lines above the names are left out", odd.above));
+            (odd.above, odd.first_above, odd.is_misnamed) = (0, None, false);
+        }
+        let Some((line, width)) = odd.first_above.or(odd.first_bad) else { return Ok(()) };
+        let bad = odd.bad + odd.above;
         let rows = self.ends.len().checked_div(self.width).unwrap_or(0);
         let what = format!("line {line} has {width} columns, the others have {}", self.width);
-        if bad > few_rows(rows + bad) || is_misnamed {
+        if bad > few_rows(rows + bad) || odd.is_misnamed {
             let commas = delimiter == b',' && (2 * width == self.width || width == 2 * self.width);
             let remedy = if commas { "; where commas are decimal signs, part the columns with `;`" } else { "" };
             return Err(format!("{what}: it is cut or damaged; mend that line or leave it out{remedy}").into());

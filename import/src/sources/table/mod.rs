@@ -6,10 +6,12 @@
 //! | `cells` | rows and names (the only csv code) |
 //! | `echoed` | stamps as `rostopic echo -p` and `ros2 topic echo --csv` write them |
 //! | `long` | tables with a row of each joint |
+//! | `moments` | stamps that are written as dates or times of a day |
 
 mod cells;
 mod echoed;
 mod long;
+mod moments;
 
 pub(super) use echoed::may_be_echoed;
 
@@ -46,6 +48,7 @@ pub(super) struct Text {
 
 pub(super) fn read(path: &Path, budget: &Budget) -> Result<Log, ImportError> {
     let mut table = text(path, budget)?;
+    moments::take(&mut table);
     long::by_joint(&mut table);
     let Text { mut columns, stamps_ns, warnings, .. } = table;
     let franka = libfranka::recognise(&mut columns);
