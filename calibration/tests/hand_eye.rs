@@ -104,12 +104,40 @@ fn corners_through_lenses_of_every_model_give_the_same_mount() {
         // What was used stands in the file, and comes back from it.
         assert_eq!(file.camera.expect("a camera").distortion, distortion);
     }
-    for (keys, what) in [(json!({ "k4": 0.1 }), "`k4`"), (json!({ "s1": 0.1 }), "`s1`")] {
+    for (keys, what) in [
+        (json!({ "k4": 0.1 }), "`k4`"),
+        (json!({ "s1": 0.1 }), "`s1`"),
+        (json!({ "distCoeffs": [0.1, 0.0, 0.0, 0.0, 0.0] }), "`distCoeffs`"),
+        (json!({ "camera_model": "omni", "distortion_model": "radtan", "k1": 0.1 }), "`omni`"),
+        (json!({ "camera": { "k1": 0.1 } }), "`camera` holds `k1`"),
+    ] {
         let mut list = list(&views);
         list.as_object_mut().expect("keys").extend(keys.as_object().expect("keys").clone());
         let line = refused(&hand_eye(folder.path(), &list, &["--force"]));
         assert!(line.contains(what), "{line}");
     }
+}
+
+#[test]
+fn intrinsics_that_are_given_leave_the_lens_as_the_files_say_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (_, mut views) = drawn(&WORLD);
+    let (lens, distortion) = (views[0].lens, Distortion::brown([-0.3, 0.1, 0.0, 0.0, 0.0]));
+    for view in &mut views {
+        view.seen.iter_mut().for_each(|seen| seen.pixel = lens.bent(&distortion, seen.pixel));
+    }
+    let mut list = list(&views);
+    let keys = list.as_object_mut().expect("keys");
+    ["fl_x", "fl_y", "cx", "cy"].iter().for_each(|key| drop(keys.remove(*key)));
+    let pinhole = [lens.focal[0], lens.focal[1], lens.centre[0], lens.centre[1]].map(|v| v.to_string()).join(",");
+    let alone = hand_eye(folder.path(), &list, &["--force", "--intrinsics", &pinhole]);
+    assert!(String::from_utf8_lossy(&alone.stdout).contains("pinhole without distortion"), "{alone:?}");
+    list["k1"] = json!(-0.3);
+    list["k2"] = json!(0.1);
+    let with_lens = hand_eye(folder.path(), &list, &["--force", "--intrinsics", &pinhole]);
+    assert!(with_lens.status.success() && !String::from_utf8_lossy(&with_lens.stdout).contains("without distortion"));
+    let file = HandEye::read(&folder.path().join("hand_eye.toml")).expect("the file");
+    assert_eq!(file.camera.expect("a camera").distortion, distortion);
 }
 
 #[test]

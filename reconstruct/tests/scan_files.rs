@@ -105,6 +105,20 @@ fn two_cameras(folder: &Path) {
 }
 
 #[test]
+fn a_set_in_parts_is_read_by_the_part_to_learn_from() {
+    let folder = tempfile::tempdir().expect("a folder");
+    listed(
+        folder.path(),
+        json!({"fl_x": 20}),
+        |number, rows| json!({"file_path": format!("train/r_{number}"), "transform_matrix": rows}),
+    );
+    let list = folder.path().join("transforms.json");
+    std::fs::rename(list, folder.path().join("transforms_train.json")).expect("it was there");
+    put(&folder.path().join("transforms_test.json"), "{}");
+    assert_eq!(Scan::open(folder.path()).expect("a scan").views.len(), 14);
+}
+
+#[test]
 fn cameras_with_a_folder_each_have_masks_of_their_own() {
     let folder = tempfile::tempdir().expect("a folder");
     two_cameras(folder.path());

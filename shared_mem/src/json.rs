@@ -1,8 +1,10 @@
 //! JSON that other programs wrote: read within the budget of its input, and what is wrong with it said by key and line.
 
 use crate::budget::{Budget, BudgetError};
+use crate::input::{Encoding, NoText, Text, decode};
 use serde::de::DeserializeOwned;
 use serde_json::error::Category;
+use std::borrow::Cow;
 
 /// What one element may become [bytes]: a short text with its key, or a list that holds nothing.
 const ELEMENT: usize = 48;
@@ -16,8 +18,52 @@ const SHOWN: usize = 40;
 /// # Errors
 /// A sentence to be put behind the input's name: the budget is spent, it is no JSON, or holds something else than a `T`.
 pub fn read<T: DeserializeOwned>(bytes: &[u8], budget: &Budget) -> Result<T, String> {
-    draw(bytes, budget).map_err(|spent| spent.to_string())?;
-    serde_json::from_slice(bytes).map_err(|error| sentence(&error))
+    let text = text(bytes)?;
+    draw(text.as_bytes(), budget).map_err(|spent| spent.to_string())?;
+    serde_json::from_str(&text).map_err(|error| match no_number(&text) {
+        Some((line, name)) if error.classify() == Category::Syntax => {
+            format!("holds {name}, which is no number of JSON (line {line}): leave its key out, or write null")
+        }
+        _ => sentence(&error),
+    })
+}
+
+/// Its letters; a name that is guessed at is worse than none.
+fn text(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
+    let plain = std::str::from_utf8(bytes).ok().filter(|text| !text.starts_with('\u{feff}') && !text.contains('\0'));
+    if let Some(plain) = plain {
+        return Ok(Cow::Borrowed(plain));
+    }
+    match decode(bytes.to_vec()) {
+        Ok(Text { encoding: Encoding::Windows1252, .. }) => {
+            let before = bytes.iter().take_while(|byte| byte.is_ascii());
+            let line = 1 + before.filter(|byte| **byte == b'\n').count();
+            Err(format!("is no JSON: {}", NoText::Encoding(line)))
+        }
+        Ok(Text { text, .. }) => Ok(Cow::Owned(text)),
+        Err(what) => Err(format!("is no JSON: {what}")),
+    }
+}
+
+/// The first word outside of texts that other programs write for what is no number, and its line.
+fn no_number(text: &str) -> Option<(usize, &'static str)> {
+    let (mut inside, mut escaped, mut line) = (false, false, 1);
+    for (at, byte) in text.bytes().enumerate() {
+        match byte {
+            _ if escaped => escaped = false,
+            b'\\' => escaped = inside,
+            b'"' => inside = !inside,
+            b'\n' => line += 1,
+            b'N' | b'n' | b'I' | b'i' if !inside => {
+                let found = ["NaN", "nan", "Infinity", "inf"].into_iter().find(|name| text[at..].starts_with(name));
+                if let Some(name) = found {
+                    return Some((line, name));
+                }
+            }
+            _ => {}
+        }
+    }
+    None
 }
 
 /// Draws what its elements may become: what stands between commas and brackets outside of texts.
@@ -123,12 +169,27 @@ mod tests {
             (r#"{"name": "a", "name": "b"}"#, "holds `name` twice"),
             ("[1]", "holds"),
             (r#"{"place": [1, 2"#, "ends in the middle of its JSON"),
-            (r#"{"place": NaN}"#, "is no JSON"),
+            ("{\"name\": \"NaN\",\n\"place\": [NaN]}", "holds NaN, which is no number of JSON (line 2)"),
+            (r#"{"place": [-Infinity]}"#, "holds Infinity"),
+            (r#"{"place": here}"#, "is no JSON"),
         ];
         for (text, wanted) in cases {
             let line = read::<Pose>(text.as_bytes(), &Budget::of(text.len() as u64)).expect_err("it is wrong");
             assert!(line.starts_with(wanted) && !line.contains("expected") && !line.contains('\n'), "{line}");
         }
+    }
+
+    #[test]
+    fn a_mark_in_front_and_utf_16_are_read_as_everywhere() {
+        let text = "{\"ä\": 1}";
+        let wide: Vec<u8> = [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+        for bytes in [text.as_bytes().to_vec(), [&[0xef, 0xbb, 0xbf], text.as_bytes()].concat(), wide] {
+            let read = read::<HashMap<String, i32>>(&bytes, &Budget::of(bytes.len() as u64)).expect("JSON");
+            assert_eq!(read["ä"], 1);
+        }
+        let latin = b"{\n\"K\xe4\": 1}";
+        let line = read::<HashMap<String, i32>>(latin, &Budget::of(12)).expect_err("a guess");
+        assert!(line.contains("line 2 is no UTF-8"), "{line}");
     }
 
     #[test]

@@ -11,10 +11,12 @@
 //! | [`calibration`] | a camera beside a picture, by the names of ROS and OpenCV |
 //! | [`coefficients`] | lenses as other programs write them: by the names of models, lists of numbers and keys |
 //! | [`listed`] | cameras as lists of pictures hold them |
+//! | [`spelling`] | which keys of a file are a lens's |
 
 pub mod calibration;
 pub mod coefficients;
 pub mod listed;
+pub mod spelling;
 
 use nalgebra::{Matrix2, RealField, Vector2, convert};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};

@@ -2,7 +2,10 @@
 
 use mcap::records::MessageHeader;
 use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::recording::{Clip, ClipMessages, Payload, Picture, Session, read_clip};
+use shared_mem::lens::Distortion;
+use shared_mem::recording::{
+    Cameras, Clip, ClipMessages, Payload, Picture, PictureKind, ReadError, Session, for_pictures, read_clip,
+};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
@@ -81,14 +84,15 @@ impl Bag {
         self.mcap.write_to_known_channel(&header, data).expect("room");
     }
 
-    fn announce(&mut self, topic: &str, name: &str) {
-        let schema = self.mcap.add_schema(name, "ros2msg", b"").expect("room");
-        self.mcap.add_channel(schema, topic, "cdr", &BTreeMap::new()).expect("room");
-    }
-
     fn joints(&mut self, topic: &str, stamp_ns: u64, names: &[&str], q: &[f64]) {
         let dq: Vec<f64> = q.iter().map(|q| 0.1 * q).collect();
         self.put(topic, JOINT_STATE, stamp_ns, &joint_state(stamp_ns, names, q, &dq));
+    }
+
+    fn camera(&mut self, model: &str, d: &[f64]) {
+        let k = [600.0, 0.0, 320.0, 0.0, 610.0, 240.0, 0.0, 0.0, 1.0];
+        let info = Cdr::default().header(7, "camera").u32(480).u32(640).text(model).u32(d.len()).numbers(d);
+        self.put("/camera_info", "sensor_msgs/msg/CameraInfo", 3, &info.numbers(&k).numbers(&[0.0; 21]).message());
     }
 
     fn read(mut self, kind: ClipKind, cell: &Cell) -> Result<Clip, String> {
@@ -148,7 +152,8 @@ fn a_missing_topic_is_an_error_that_lists_what_is_there_and_where_to_say_so() {
 fn a_topic_on_which_nothing_came_and_a_file_that_was_cut_are_told_from_a_wrong_name() {
     let mut bag = Bag::new();
     bag.joints(MEASURED, 1, &NAMES, &[0.0, 0.0]);
-    bag.announce(DESIRED, JOINT_STATE);
+    let schema = bag.mcap.add_schema(JOINT_STATE, "ros2msg", b"").expect("room");
+    bag.mcap.add_channel(schema, DESIRED, "cdr", &BTreeMap::new()).expect("room");
     let error = bag.read(ClipKind::Excitation, &cell()).unwrap_err();
     assert!(error.contains("nobody published desired joints") && !error.contains("[topics]"), "{error}");
     let mut bag = Bag::new();
@@ -305,8 +310,8 @@ fn poses_and_transforms_are_read_and_a_lost_track_is_told() {
         }
         let clip = bag.read(ClipKind::FreeMotion, &free).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(clip.object.len(), 149);
-        assert_eq!(clip.object.poses[3].position(), [0.5, 0.1, 0.05]);
-        assert_eq!(clip.object.poses[3].wxyz(), [0.8, 0.0, 0.0, 0.6]);
+        let pose = &clip.object.poses[3];
+        assert_eq!((pose.position(), pose.wxyz()), ([0.5, 0.1, 0.05], [0.8, 0.0, 0.0, 0.6]));
         assert!(clip.warnings.iter().any(|w| w.contains("row 100")), "{:?}", clip.warnings);
     }
 }
@@ -340,15 +345,11 @@ fn pictures_and_calibrations_of_a_bag_are_iterated_in_order() {
     bag.put("/image", "sensor_msgs/msg/Image", 1, &image.bytes(&[3, 2, 1, 6, 5, 4]).message());
     let jpeg = Cdr::default().header(6, "camera").text("jpeg").bytes(&[0xff, 0xd8, 0xff]);
     bag.put("/image/compressed", "sensor_msgs/msg/CompressedImage", 2, &jpeg.message());
-    let k = [600.0, 0.0, 320.0, 0.0, 610.0, 240.0, 0.0, 0.0, 1.0];
-    let info = Cdr::default().header(7, "camera").u32(480).u32(640).text("plumb_bob").u32(5).numbers(&[0.1; 5]);
-    bag.put("/camera_info", "sensor_msgs/msg/CameraInfo", 3, &info.numbers(&k).numbers(&[0.0; 21]).message());
+    bag.camera("plumb_bob", &[0.1; 5]);
     bag.mcap.finish().expect("room");
     let messages: Vec<_> = ClipMessages::open(&bag.path, &[]).expect("a bag").map(|m| m.expect("decodes")).collect();
-    assert_eq!(
-        messages.iter().map(|m| m.topic.as_str()).collect::<Vec<_>>(),
-        ["/image", "/image/compressed", "/camera_info"]
-    );
+    let topics: Vec<_> = messages.iter().map(|m| m.topic.as_str()).collect();
+    assert_eq!(topics, ["/image", "/image/compressed", "/camera_info"]);
     match &messages[0].payload {
         Payload::Picture(Picture::Pixels { header, pixels }) => {
             assert_eq!((header.stamp_ns, header.width, pixels.as_slice()), (5, 2, &[1, 2, 3, 4, 5, 6][..]));
@@ -357,10 +358,23 @@ fn pictures_and_calibrations_of_a_bag_are_iterated_in_order() {
     }
     let jpeg = Picture::Compressed { stamp_ns: 6, format: "jpeg".into(), bytes: vec![0xff, 0xd8, 0xff] };
     assert_eq!(messages[1].payload, Payload::Picture(jpeg));
-    match &messages[2].payload {
-        Payload::CameraInfo(info) => assert_eq!((info.intrinsics, info.width), ([600.0, 610.0, 320.0, 240.0], 640)),
-        other => panic!("{other:?}"),
-    }
+    let Payload::CameraInfo(info) = &messages[2].payload else { panic!("{:?}", messages[2]) };
+    assert_eq!((info.intrinsics, info.width), ([600.0, 610.0, 320.0, 240.0], 640));
+}
+
+#[test]
+fn pictures_of_a_fisheye_and_joints_without_commands_are_read() {
+    let mut bag = Bag::new();
+    (1..50).for_each(|i| bag.joints(MEASURED, i * 1_000_000, &NAMES, &[q(i, 0), q(i, 1)]));
+    bag.camera("equidistant", &[0.1; 4]);
+    bag.mcap.finish().expect("room");
+    let said = Cameras::of(&bag.path).expect("a bag").said;
+    assert!(matches!(&said[..], [(_, Ok(camera))] if camera.distortion == Distortion::Fisheye([0.1; 4])));
+    for_pictures::<ReadError>(&bag.path, PictureKind::Color, |_, _| Ok(())).expect("no lens is asked for");
+    std::fs::write(bag.path.with_file_name("cell.toml"), cell().to_toml()).expect("room");
+    let session = Session::open(&bag.path).expect("a session");
+    let clip = session.read_measured(&session.clips[0]).expect("joints");
+    assert_eq!((clip.measured.len(), clip.desired.len()), (49, 0));
 }
 
 #[test]

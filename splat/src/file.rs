@@ -42,7 +42,7 @@ impl SplatCloud {
     /// Reads a PLY file of either kind, and says on standard error what was left out of it.
     ///
     /// # Errors
-    /// [`SplatError`] when it is missing, cut short, most of its splats hold values that are no numbers, or it is another kind of
+    /// [`SplatError`] when it is missing, most of its splats are cut off or hold values that are no numbers, or it is another kind of
     /// file.
     pub fn read(path: &Path) -> Result<Self, SplatError> {
         let bytes = input::bytes(path, input::Kind::Splats)?;
@@ -87,7 +87,11 @@ impl SplatCloud {
 /// The splats of a file whose values are numbers. Trainers leave a few in a million that are none.
 fn parsed(bytes: &[u8]) -> Result<ply::Read, String> {
     let file = ply::File::parse(bytes)?;
+    if let Some(cut) = file.cut.as_ref().filter(|_| !file.is_half_there()) {
+        return Err(cut.clone());
+    }
     let mut read = if file.element("chunk").is_some() { compressed::read(&file)? } else { ply::read(&file)? };
+    read.remarks.extend(file.cut.map(|cut| format!("{cut}, which were read")));
     let (all, fine) = (read.cloud.splats.len(), read.cloud.finite());
     let left_out = fine.iter().filter(|fine| !**fine).count();
     if 2 * left_out > all {

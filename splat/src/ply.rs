@@ -21,14 +21,17 @@ pub(super) struct File<'a> {
     elements: Vec<Element>,
     /// Binary and little-endian.
     rows: Cow<'a, [u8]>,
+    /// What is missing at its end, where it was cut.
+    pub(super) cut: Option<String>,
 }
 
 /// One table of the file.
 #[derive(Debug)]
 pub(super) struct Element {
     pub(super) name: String,
-    /// Rows.
+    /// Rows, and those that the header claims.
     pub(super) count: usize,
+    claimed: usize,
     /// Names and sizes of the columns [bytes].
     columns: Vec<(String, Kind)>,
     /// Where it begins among the rows [bytes].
@@ -88,11 +91,19 @@ fn header(bytes: &[u8]) -> Result<(&str, usize), String> {
         [b'p', b'l', b'y', ..] => b"\n",
         _ => return Err("it is no PLY file".into()),
     };
-    let last = [end, b"end_header", end].concat();
+    let last = [end, b"end_header"].concat();
     let head = &bytes[..bytes.len().min(LONGEST)];
-    let at = head.windows(last.len()).position(|window| window == last).ok_or("its header has no end")?;
+    // Blanks may follow, and the end of a line.
+    let begin = |at: usize| {
+        let rest = &head[at + last.len()..];
+        let blanks = rest.iter().take_while(|byte| matches!(byte, b' ' | b'\t') || **byte == b'\r' && end == b"\n");
+        let blanks = blanks.count();
+        rest[blanks..].starts_with(end).then_some(at + last.len() + blanks + end.len())
+    };
+    let ends = head.windows(last.len()).enumerate().filter(|(_, window)| *window == last);
+    let (at, begin) = ends.filter_map(|(at, _)| Some((at, begin(at)?))).next().ok_or("its header has no end")?;
     let text = std::str::from_utf8(&head[..at]).map_err(|_| "its header is no text")?;
-    Ok((text, at + last.len()))
+    Ok((text, begin))
 }
 
 impl<'a> File<'a> {
@@ -104,39 +115,56 @@ impl<'a> File<'a> {
             match words[..] {
                 ["format", name, ..] => format = Some(Format::parse(name)?),
                 ["element", name, count] => {
-                    let count = count.parse().map_err(|_| format!("it has `{count}` rows of {name}"))?;
-                    elements.push(Element { name: name.into(), count, columns: Vec::new(), begin: 0 });
+                    let count: usize = count.parse().map_err(|_| format!("it has `{count}` rows of {name}"))?;
+                    elements.push(Element { name: name.into(), count, claimed: count, columns: Vec::new(), begin: 0 });
                 }
                 ["property", kind, name] => {
                     let kind = Kind::parse(kind).ok_or_else(|| format!("column {name} is of unknown type {kind}"))?;
                     let element = elements.last_mut().ok_or("a column stands before any table")?;
                     element.columns.push((name.into(), kind));
                 }
-                ["property", "list", ..] => return Err("it holds lists: it is a mesh, no splats".into()),
+                ["property", "list", ..] if elements.last().is_none_or(|element| element.count > 0) => {
+                    return Err("it holds lists: it is a mesh, no splats".into());
+                }
                 _ => {}
             }
         }
         let format = format.ok_or("its header does not say its format")?;
         let body = &bytes[begin..];
         let mut end = 0usize;
-        for element in &elements {
-            let size = element.count.checked_mul(format.least(element)).and_then(|size| end.checked_add(size));
-            end = size.ok_or("it claims more rows than any file holds")?;
-        }
-        if end > body.len() {
-            return Err(format!("it is cut short: {} bytes of {}", bytes.len(), begin + end));
+        for element in &mut elements {
+            let least = format.least(element);
+            let size = element.count.checked_mul(least).and_then(|size| end.checked_add(size));
+            let whole = size.ok_or("it claims more rows than any file holds")?;
+            if whole > body.len() {
+                element.count = body.len().saturating_sub(end) / least.max(1);
+            }
+            end = whole;
         }
         let rows = match format {
             Format::Little => Cow::Borrowed(body),
             Format::Big => Cow::Owned(ply_rows::turned(&elements, body)),
-            Format::Ascii => Cow::Owned(ply_rows::parsed(&elements, body)?),
+            Format::Ascii => Cow::Owned(ply_rows::parsed(&mut elements, body)?),
         };
+        let cut = elements.iter().find(|element| element.count < element.claimed).map(|element| {
+            let Element { name, count, claimed, .. } = element;
+            format!("it is cut short: {count} of {claimed} rows of its table `{name}` are there")
+        });
         let mut begin = 0;
         for element in &mut elements {
             element.begin = begin;
             begin += element.count * element.stride();
         }
-        Ok(Self { elements, rows })
+        Ok(Self { elements, rows, cut })
+    }
+
+    /// Whether at least half of the splats that it claims are there, and all that belongs to them.
+    pub(super) fn is_half_there(&self) -> bool {
+        let is_whole = |name: &str| self.element(name).is_none_or(|element| element.count == element.claimed);
+        let is_half = self.element("vertex").is_some_and(|splats| 2 * splats.count >= splats.claimed);
+        // Colours of a compressed file stand behind all of its splats.
+        let has_colours = self.element("sh").is_none() || is_whole("vertex");
+        is_half && has_colours && is_whole("chunk") && is_whole("sh")
     }
 
     /// The rows of one of its tables.

@@ -47,22 +47,30 @@ pub(super) fn turned(elements: &[Element], body: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Written-out rows as little-endian ones.
-pub(super) fn parsed(elements: &[Element], body: &[u8]) -> Result<Vec<u8>, String> {
+/// Written-out rows as little-endian ones; of a file that was cut those that are whole, which is then their count.
+pub(super) fn parsed(elements: &mut [Element], body: &[u8]) -> Result<Vec<u8>, String> {
     let text = std::str::from_utf8(body).map_err(|_| "its format is ascii, and its rows are no text")?;
     let mut words = text.split_ascii_whitespace();
+    // The last word of a file that was cut may be half a number.
+    let is_cut_in_word = !text.ends_with(|letter: char| letter.is_ascii_whitespace());
     let mut out = Vec::new();
     for element in elements {
         for row in 0..element.count {
-            for kind in element.kinds() {
+            let before = out.len();
+            let mut missing = None;
+            for (column, kind) in element.kinds().enumerate() {
                 let Some(word) = words.next() else {
-                    return Err(format!(
-                        "it is cut short: {row} rows of {} in table `{}`",
-                        element.count, element.name
-                    ));
+                    missing = Some(column);
+                    break;
                 };
                 put(kind, word, &mut out)
                     .ok_or_else(|| format!("`{word}` stands in row {row} of its table `{}`", element.name))?;
+            }
+            if let Some(column) = missing {
+                let half = usize::from(column == 0 && is_cut_in_word && row > 0);
+                out.truncate(before - half * element.stride());
+                element.count = row - half;
+                break;
             }
         }
     }

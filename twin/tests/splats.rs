@@ -303,6 +303,32 @@ fn discs_and_colours_of_a_higher_degree_are_read_as_far_as_they_are_drawn() {
 }
 
 #[test]
+fn of_a_file_that_was_cut_the_whole_splats_are_read() {
+    let whole = file(&[[0.0; 3], [1.0; 3], [2.0; 3]], 0.5);
+    assert_eq!(SplatCloud::parse(&whole[..whole.len() - 1]).expect("two of three").splats.len(), 2);
+    let text = |values: &[f32], out: &mut Vec<u8>| {
+        let words: Vec<String> = values.iter().map(f32::to_string).collect();
+        out.extend((words.join(" ") + "\n").into_bytes());
+    };
+    let (cloud, bytes) = written(|header| header.replace("binary_little_endian", "ascii"), text);
+    // Its last number may have more digits than are left.
+    for left in [2, 60] {
+        let read = SplatCloud::parse(&bytes[..bytes.len() - left]).expect("some").splats.len();
+        assert_eq!(read, if left == 2 { 3 } else { 2 }, "{left}");
+    }
+    assert_eq!(cloud.splats.len(), 3);
+    // A table without rows behind the splats, and a blank behind the header.
+    for (from, to) in [
+        ("end_header\n", "element face 0\nproperty list uchar int vertex_indices\nend_header\n"),
+        ("end_header\n", "end_header \n"),
+    ] {
+        let at = whole.windows(from.len()).position(|window| window == from.as_bytes()).expect("an end");
+        let bytes = [&whole[..at], to.as_bytes(), &whole[at + from.len()..]].concat();
+        assert_eq!(SplatCloud::parse(&bytes).expect(to).splats.len(), 3);
+    }
+}
+
+#[test]
 fn what_is_wrong_with_a_file_is_said_in_one_line() {
     let whole = file(&[[0.0; 3], [1.0; 3]], 0.5);
     // The header with one word changed, and the two rows as they were.
@@ -312,7 +338,7 @@ fn what_is_wrong_with_a_file_is_said_in_one_line() {
         [header.as_bytes(), rows].concat()
     };
     for (bytes, told) in [
-        (whole[..whole.len() - 1].to_vec(), "cut short"),
+        (whole[..whole.len() - 14 * 4 - 1].to_vec(), "cut short"),
         (whole[..60].to_vec(), "no end"),
         (file(&[[0.0; 3], [f32::NAN, 0.0, 0.0], [f32::NAN; 3]], 0.5), "2 of 3 splats"),
         (file(&[[f32::INFINITY; 3]], 0.5), "no finite number"),

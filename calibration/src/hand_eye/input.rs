@@ -11,7 +11,6 @@ use anyhow::{Context as _, anyhow, bail, ensure};
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use serde_json::{Map, Value};
 use shared_mem::budget::Budget;
 use shared_mem::cell::{Cell, Intrinsics};
@@ -21,8 +20,8 @@ use shared_mem::input::{self, Kind};
 use shared_mem::json;
 use shared_mem::lens::Distortion;
 use shared_mem::lens::calibration::Calibration;
-use shared_mem::lens::coefficients::Keys;
 use shared_mem::lens::listed::{ListedCamera, Numbers};
+use shared_mem::lens::spelling::Other;
 use shared_mem::recording::{PictureKind, Session, picture_size};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -63,7 +62,7 @@ struct List {
     camera: Numbers,
     frames: Vec<Listed>,
     #[serde(flatten)]
-    others: BTreeMap<String, IgnoredAny>,
+    others: BTreeMap<String, Other>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -76,7 +75,7 @@ struct Listed {
     #[serde(flatten)]
     camera: Numbers,
     #[serde(flatten)]
-    others: BTreeMap<String, IgnoredAny>,
+    others: BTreeMap<String, Other>,
 }
 
 /// The pixels of a picture, or what another detector has found in it.
@@ -109,16 +108,16 @@ const HALF: f64 = 0.5;
 /// One line: what is missing or does not fit together, and what to do.
 pub fn taken(source: &Source) -> anyhow::Result<Taken> {
     let list = source.target.join("poses.json");
-    let Shots { camera: own, shots, remarks } = if list.is_file() {
-        listed(&source.target, &list)?
+    let Shots { camera: own, shots, mut remarks } = if list.is_file() {
+        listed(source, &list)?
     } else if source.target.is_dir() && source.cell.is_none() && !source.target.join("cell.toml").is_file()
         || has_pictures(&source.target)
     {
-        beside(&source.target)?
+        beside(source)?
     } else {
         recorded(source)?
     };
-    let camera = camera(source, own)?;
+    let camera = camera(source, own, &mut remarks)?;
     let lens = Lens::new(&camera.intrinsics);
     let found: Vec<Result<View, String>> =
         shots.into_par_iter().map(|shot| view(source, &camera, lens, shot)).collect::<anyhow::Result<_>>()?;
@@ -148,18 +147,19 @@ fn has_pictures(folder: &Path) -> bool {
     !pictures(folder).is_empty()
 }
 
-fn listed(folder: &Path, path: &Path) -> anyhow::Result<Shots> {
+fn listed(source: &Source, path: &Path) -> anyhow::Result<Shots> {
+    let folder = &source.target;
     let bytes = input::bytes(path, Kind::List)?;
     let list = parsed(path, &bytes, &Budget::of(bytes.len() as u64))?;
     let in_list = |what: String| anyhow!("{}: {what}", path.display());
-    Keys::none_unread(list.others.keys().map(String::as_str)).map_err(in_list)?;
+    Numbers::none_unread(&list.others).map_err(in_list)?;
     let (mut camera, mut shots) = (None, Vec::new());
     for frame in list.frames {
         let name = frame.file_path.display().to_string();
         let in_frame = |what: String| in_list(format!("{name}: {what}"));
-        Keys::none_unread(frame.others.keys().map(String::as_str)).map_err(in_frame)?;
+        Numbers::none_unread(&frame.others).map_err(in_frame)?;
         let picture = folder.join(&frame.file_path);
-        let here = listed_camera(&frame.camera, &list.camera, &picture).map_err(in_frame)?;
+        let here = listed_camera(&frame.camera, &list.camera, &picture, source.intrinsics).map_err(in_frame)?;
         let camera_of_all = *camera.get_or_insert(here);
         ensure!(
             camera_of_all == here,
@@ -178,10 +178,21 @@ fn parsed(path: &Path, bytes: &[u8], budget: &Budget) -> anyhow::Result<List> {
     json::read(bytes, budget).map_err(|what| anyhow!("{} {what}; docs/hand_eye.md has its keys", path.display()))
 }
 
-/// The camera of a frame; `None` where the list says nothing about it.
-fn listed_camera(own: &Numbers, all: &Numbers, picture: &Path) -> Result<Option<CalibratedCamera>, String> {
-    if !own.has_focal() && !all.has_focal() && !own.has_lens() && !all.has_lens() {
-        return Ok(None);
+/// The camera of a frame; `None` where the list says nothing about it. A lens may stand there without its pinhole, which is `given`.
+fn listed_camera(
+    own: &Numbers,
+    all: &Numbers,
+    picture: &Path,
+    given: Option<[f64; 4]>,
+) -> Result<Option<CalibratedCamera>, String> {
+    if !own.has_focal() && !all.has_focal() {
+        if !own.has_lens() && !all.has_lens() {
+            return Ok(None);
+        }
+        if let Some([fx, fy, cx, cy]) = given {
+            let distortion = own.distortion(all)?;
+            return Ok(Some(CalibratedCamera { intrinsics: Intrinsics { fx, fy, cx, cy }, distortion }));
+        }
     }
     let size = || picture_size(picture).map_err(|error| format!("`w` and `h` are missing, and {error}"));
     let ListedCamera { focal: [fx, fy], centre: [cx, cy], lens } = own.camera(all, || own.size(all, size))?;
@@ -189,7 +200,8 @@ fn listed_camera(own: &Numbers, all: &Numbers, picture: &Path) -> Result<Option<
     Ok(Some(CalibratedCamera { intrinsics, distortion: lens }))
 }
 
-fn beside(folder: &Path) -> anyhow::Result<Shots> {
+fn beside(source: &Source) -> anyhow::Result<Shots> {
+    let folder = &source.target;
     let found = pictures(folder);
     ensure!(
         !found.is_empty(),
@@ -210,7 +222,9 @@ fn beside(folder: &Path) -> anyhow::Result<Shots> {
         let pose = matrix.isometry().map_err(in_file)?;
         let here = Calibration::of(&file).map_err(in_file)?;
         if let Some(here) = &here {
-            let [fx, fy, cx, cy] = here.pinhole;
+            let [fx, fy, cx, cy] = here.pinhole.or(source.intrinsics).with_context(|| {
+                format!("{} holds a lens and no `K`: add it, nine numbers, or give --intrinsics", path.display())
+            })?;
             let camera = CalibratedCamera { intrinsics: Intrinsics { fx, fy, cx, cy }, distortion: here.distortion };
             ensure!(
                 out.camera.is_none_or(|before| before == camera),
@@ -267,30 +281,48 @@ fn recorded(source: &Source) -> anyhow::Result<Shots> {
         let pose = arm.flange(&q).isometry();
         Ok(Shot { name: shot.name, base_from_end_effector: pose, content: Content::Pixels(shot.pixels), size: None })
     });
-    let camera = session
-        .cell
-        .camera
-        .as_ref()
-        .map(|camera| CalibratedCamera { intrinsics: camera.pinhole(), distortion: camera.distortion });
-    Ok(Shots { camera, shots: shots.collect::<anyhow::Result<_>>()?, remarks: Vec::new() })
+    let session::Known { camera: of_bag, remarks } = session::camera(&session, PictureKind::Color)?;
+    let of_bag = of_bag.and_then(|camera| Some((camera.pinhole?, camera.distortion)));
+    let camera = match of_bag {
+        Some(([fx, fy, cx, cy], distortion)) => {
+            Some(CalibratedCamera { intrinsics: Intrinsics { fx, fy, cx, cy }, distortion })
+        }
+        None => session
+            .cell
+            .camera
+            .as_ref()
+            .map(|camera| CalibratedCamera { intrinsics: camera.pinhole(), distortion: camera.distortion }),
+    };
+    Ok(Shots { camera, shots: shots.collect::<anyhow::Result<_>>()?, remarks })
 }
 
-/// The camera's numbers: those given, else those beside the pictures, else the cell's.
-fn camera(source: &Source, own: Option<CalibratedCamera>) -> anyhow::Result<CalibratedCamera> {
+/// The camera's numbers: those given, else those beside the pictures, else the cell's. Intrinsics that are given leave the lens as it is.
+fn camera(
+    source: &Source,
+    own: Option<CalibratedCamera>,
+    remarks: &mut Vec<String>,
+) -> anyhow::Result<CalibratedCamera> {
     let of_cell = || -> anyhow::Result<Option<CalibratedCamera>> {
         let Some(path) = &source.cell else { return Ok(None) };
         let camera = Cell::read(path)?.camera;
         Ok(camera.map(|camera| CalibratedCamera { intrinsics: camera.pinhole(), distortion: camera.distortion }))
     };
+    let known = own.map_or_else(of_cell, |own| Ok(Some(own)))?;
     let found = match source.intrinsics {
         Some([fx, fy, cx, cy]) => {
-            let distortion = own.map_or(Distortion::NONE, |own| own.distortion);
+            if known.is_none() {
+                remarks.push("no file says the lens: --intrinsics alone is a pinhole without distortion".into());
+            }
+            let distortion = known.map_or(Distortion::NONE, |known| known.distortion);
             Some(CalibratedCamera { intrinsics: Intrinsics { fx, fy, cx, cy }, distortion })
         }
-        None => own.map_or_else(of_cell, |own| Ok(Some(own)))?,
+        None => known,
     };
     let Some(camera) = found else {
-        bail!("no intrinsics: give --intrinsics fx,fy,cx,cy, --cell with a `[camera]`, or `fl_x` in poses.json")
+        bail!(
+            "no intrinsics: add `K` and `D` to the files beside the pictures, `fl_x` and `k1` to poses.json, or give --cell with a \
+             `[camera]`; --intrinsics fx,fy,cx,cy is a pinhole without distortion where no file says the lens"
+        )
     };
     let Intrinsics { fx, fy, cx, cy } = camera.intrinsics;
     ensure!(

@@ -90,6 +90,13 @@ struct Taken {
     moment: Moment,
 }
 
+/// What was given: the cell, the pictures, and what is to be said about their camera.
+struct Gathered {
+    cell: Cell,
+    taken: Vec<Taken>,
+    remarks: Vec<String>,
+}
+
 /// Everything that a pose is found from.
 struct Prepared {
     cell: Cell,
@@ -182,11 +189,11 @@ fn prepared(options: &Options) -> anyhow::Result<Prepared> {
     let kinds = kinds(options);
     let (mut why, last) = (None, kinds.len() - 1);
     for (number, kind) in kinds.into_iter().enumerate() {
-        let (cell, taken) = gather(options, kind)?;
-        if taken.is_empty() && number < last {
+        let gathered = gather(options, kind)?;
+        if gathered.taken.is_empty() && number < last {
             continue;
         }
-        match of_pictures(options, cell, taken) {
+        match of_pictures(options, gathered) {
             Err(error) if number < last => why = Some(error),
             Err(error) => return Err(error),
             Ok(mut prepared) => {
@@ -198,10 +205,14 @@ fn prepared(options: &Options) -> anyhow::Result<Prepared> {
     bail!("no pictures")
 }
 
-fn of_pictures(options: &Options, cell: Cell, taken: Vec<Taken>) -> anyhow::Result<Prepared> {
-    let mut warnings = Vec::new();
+fn of_pictures(options: &Options, gathered: Gathered) -> anyhow::Result<Prepared> {
+    let Gathered { cell, taken, remarks: mut warnings } = gathered;
     let camera = camera(&cell, options, &taken)?;
-    warnings.extend(own_camera(&taken)?.and_then(|own| own.remark()));
+    let own = own_camera(&taken)?;
+    warnings.extend(own.and_then(|own| own.remark()));
+    if options.intrinsics.is_some() && own.is_none() && cell.camera.is_none() {
+        warnings.push("no file says the lens: --intrinsics alone is a pinhole without distortion".into());
+    }
     let lens = Lens::new(&camera.pinhole());
     let surface = RobotSurface::new(&cell, options.hand)?;
     ensure!(
@@ -217,7 +228,7 @@ fn of_pictures(options: &Options, cell: Cell, taken: Vec<Taken>) -> anyhow::Resu
 }
 
 /// The cell and the pictures of a kind; files are of the kind they are.
-fn gather(options: &Options, kind: PictureKind) -> anyhow::Result<(Cell, Vec<Taken>)> {
+fn gather(options: &Options, kind: PictureKind) -> anyhow::Result<Gathered> {
     let is_picture = |path: &Path| {
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
         ["png", "jpg", "jpeg"].contains(&ending.as_str())
@@ -240,7 +251,7 @@ fn gather(options: &Options, kind: PictureKind) -> anyhow::Result<(Cell, Vec<Tak
             ensure!(wanted, "{name} shows colours: give depth pictures, or leave --depth out");
             Ok(Taken { name, pixels, moment: Moment::parse(joints)? })
         });
-        return Ok((cell, taken.collect::<anyhow::Result<_>>()?));
+        return Ok(Gathered { cell, taken: taken.collect::<anyhow::Result<_>>()?, remarks: Vec::new() });
     }
     let [target] = &options.targets[..] else { bail!("give either one session or clip, or pictures (png, jpg)") };
     let session = Session::open_with(target, options.cell.as_deref())?;
@@ -252,11 +263,12 @@ fn gather(options: &Options, kind: PictureKind) -> anyhow::Result<(Cell, Vec<Tak
         session.folder.display(),
         if kind == PictureKind::Color { "colour" } else { "depth" }
     );
+    let known = session::camera(&session, kind)?;
     let taken = shots.into_iter().map(|shot| {
-        let moment = Moment { q: shot.q, camera: None };
+        let moment = Moment { q: shot.q, camera: known.camera };
         Taken { name: shot.name, pixels: shot.pixels, moment }
     });
-    Ok((session.cell, taken.collect()))
+    Ok(Gathered { taken: taken.collect(), cell: session.cell, remarks: known.remarks })
 }
 
 /// The camera that files beside the pictures name: one for all of them.
@@ -279,7 +291,12 @@ fn camera(cell: &Cell, options: &Options, taken: &[Taken]) -> anyhow::Result<Cam
     let first = taken.first().context("no pictures")?;
     let own = own_camera(taken)?;
     let mut size = [camera.width as usize, camera.height as usize];
-    if let Some([fx, fy, cx, cy]) = options.intrinsics.or(own.map(|own| own.pinhole)) {
+    let pinhole = options.intrinsics.or(own.and_then(|own| own.pinhole));
+    ensure!(
+        pinhole.is_some() || own.is_none(),
+        "the joint files hold a lens and no `K`: add it, nine numbers, or give --intrinsics"
+    );
+    if let Some([fx, fy, cx, cy]) = pinhole {
         ensure!(fx > 0.0 && fy > 0.0, "focal lengths must be above 0, not {fx} and {fy}");
         size = own.and_then(|own| own.size).unwrap_or(first.pixels.size);
         camera.intrinsics = Some(Intrinsics { fx, fy, cx, cy });
@@ -287,7 +304,9 @@ fn camera(cell: &Cell, options: &Options, taken: &[Taken]) -> anyhow::Result<Cam
             camera.distortion = own.distortion;
         }
     } else if cell.camera.is_none() {
-        bail!("no intrinsics: give --cell with a `[camera]`, --intrinsics fx,fy,cx,cy, or a joint file with `K`");
+        bail!(
+            "no intrinsics: give --cell with a `[camera]`, a joint file with `K` and `D`, or --intrinsics fx,fy,cx,cy without a lens"
+        );
     }
     let pinhole = camera.pinhole();
     let off = [(pinhole.cx, size[0]), (pinhole.cy, size[1])].map(|(at, size)| (at / size as f64 - 0.5).abs());

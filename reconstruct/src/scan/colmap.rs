@@ -134,7 +134,7 @@ fn read_text(folder: &Path) -> Result<Model, ScanError> {
 fn text_images(file: &Text, cameras: &HashMap<u32, Camera>) -> Result<Vec<Image>, ScanError> {
     let content = |what: String| ScanError::content(&file.path, what);
     let mut images = Vec::new();
-    let mut rest = lines(&file.text);
+    let mut rest = lines(&file.text).peekable();
     while let Some(line) = rest.next() {
         if line.trim().is_empty() {
             continue;
@@ -142,17 +142,35 @@ fn text_images(file: &Text, cameras: &HashMap<u32, Camera>) -> Result<Vec<Image>
         let words = file.words(line)?;
         let bad = || content(format!("the line `{}` is no image", shown(line)));
         let [_, q0, q1, q2, q3, x, y, z, camera, name @ ..] = &words[..] else { return Err(bad()) };
+        if name.is_empty() {
+            return Err(bad());
+        }
         let v: Vec<f64> = numbers(&[q0, q1, q2, q3, x, y, z]).ok_or_else(bad)?;
-        let seen: Vec<f64> = numbers(&file.words(rest.next().unwrap_or(""))?).ok_or_else(bad)?;
+        // Editors take empty lines away: then the line of the next image follows, whose name is no number.
+        let seen = file.words(rest.peek().copied().unwrap_or(""))?;
+        let seen: Vec<f64> = numbers(&seen).filter(|seen| seen.len() % 3 == 0).map_or_else(Vec::new, |seen| {
+            rest.next();
+            seen
+        });
         let seen = seen.chunks_exact(3).filter(|three| three[2] >= 0.0);
         images.push(Image {
-            name: name.join(" "),
+            name: after(line, words.len() - name.len()).to_owned(),
             camera: camera_of(cameras, camera.parse().map_err(|_| bad())?).map_err(content)?,
             model_from_camera: pose([v[0], v[1], v[2], v[3]], [v[4], v[5], v[6]]).map_err(content)?,
             seen: seen.map(|three| ([three[0], three[1]], three[2] as u64)).collect(),
         });
     }
     Ok(images)
+}
+
+/// What stands in a line behind so many words, with all blanks inside of it.
+fn after(line: &str, words: usize) -> &str {
+    let mut rest = line.trim();
+    for _ in 0..words {
+        let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
+        rest = rest[end..].trim_start();
+    }
+    rest
 }
 
 fn text_points(file: &Text) -> Result<HashMap<u64, Point3<f64>>, ScanError> {
@@ -323,7 +341,7 @@ mod tests {
     fn model() -> (&'static str, &'static str, &'static str) {
         (
             "# cameras\n1 PINHOLE 640 480 600 600 320 240\n",
-            "# images\n1 1 0 0 0 0 0 0.5 1 a b.png\n100 110 7 5 5 -1\n2 0 1 0 0 0.1 0 0.4 1 c.png\n\n",
+            "# images\n1 1 0 0 0 0 0 0.5 1 a  b.png\n100 110 7 5 5 -1\n2 0 1 0 0 0.1 0 0.4 1 c.png\n\n",
             "7 0.01 0.02 0.03 255 0 0 0.5 1 0\n",
         )
     }
@@ -337,10 +355,20 @@ mod tests {
         }
         let model = read(folder.path()).expect("a model");
         assert_eq!(model.images.len(), 2);
-        assert_eq!((model.images[0].name.as_str(), &model.images[0].seen[..]), ("a b.png", &[([100.0, 110.0], 7)][..]));
+        assert_eq!(
+            (model.images[0].name.as_str(), &model.images[0].seen[..]),
+            ("a  b.png", &[([100.0, 110.0], 7)][..])
+        );
         // The camera stands half a unit behind the origin that it looks at.
         assert!((model.images[0].model_from_camera.translation.vector - Vector3::new(0.0, 0.0, -0.5)).norm() < 1e-12);
         assert_eq!(model.points[&7], Point3::new(0.01, 0.02, 0.03));
+        let images = "1 1 0 0 0 0 0 0.5 1 a.png\n2 1 0 0 0 0 0 0.5 1 b.png\n1 2 -1\n3 1 0 0 0 0 0 0.5 1 c.png\n";
+        std::fs::write(folder.path().join("images.txt"), images).expect("a file");
+        let without = read(folder.path()).expect("a model without empty lines");
+        assert_eq!(
+            without.images.iter().map(|image| image.name.as_str()).collect::<Vec<_>>(),
+            ["a.png", "b.png", "c.png"]
+        );
         std::fs::write(folder.path().join("images.txt"), "1 1 0 0 0 0 0 0.5 9 a.png\n\n").expect("a file");
         let line = read(folder.path()).expect_err("no such camera").to_string();
         assert!(line.contains("names camera 9"), "{line}");

@@ -86,11 +86,24 @@ enum Poses {
     Colmap(PathBuf),
 }
 
+/// The file of the pictures to learn from where a set comes in parts (Blender's, of NeRF), and the other parts.
+const PARTS: [&str; 3] = ["transforms_train.json", "transforms_val.json", "transforms_test.json"];
+
+/// A remark on the parts of a set that are not read.
+fn other_parts(scan: &Path, file: &Path) -> Option<Remark> {
+    let is_part = |name: &&str| scan.is_dir() && file == scan.join(PARTS[0]) && scan.join(name).is_file();
+    let names: Vec<&str> = PARTS[1..].iter().copied().filter(is_part).collect();
+    (!names.is_empty()).then(|| {
+        let names = names.join("` and `");
+        Remark(format!("read were the pictures of `{}`; those of `{names}` were left out", PARTS[0]))
+    })
+}
+
 fn poses_of(scan: &Path) -> Result<Poses, ScanError> {
     if scan.is_file() {
         return Ok(Poses::File(scan.to_owned()));
     }
-    let files = ["transforms.json", "poses.json"].map(|name| scan.join(name));
+    let files = ["transforms.json", "poses.json", PARTS[0]].map(|name| scan.join(name));
     if let Some(file) = files.into_iter().find(|file| file.is_file()) {
         return Ok(Poses::File(file));
     }
@@ -98,7 +111,7 @@ fn poses_of(scan: &Path) -> Result<Poses, ScanError> {
         return Ok(Poses::Colmap(folder));
     }
     Err(ScanError::Missing(format!(
-        "{}: no poses; a scan holds transforms.json (nerfstudio), poses.json (a robot's) or a COLMAP model in sparse/0",
+        "{}: no poses; a scan holds transforms.json (nerfstudio) or transforms_train.json, poses.json (a robot's) or a COLMAP model in sparse/0",
         scan.display()
     )))
 }
@@ -117,6 +130,7 @@ impl Scan {
             Poses::File(file) => {
                 let list = transforms::read(file)?;
                 (table, remarks) = (list.table, list.remarks);
+                remarks.extend(other_parts(scan, file));
                 (list.listed, list.depth_unit, list.of_robot)
             }
             Poses::Colmap(model) => {

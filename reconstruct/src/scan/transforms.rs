@@ -9,13 +9,12 @@ use super::picture;
 use crate::remark::Remark;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use shared_mem::budget::Budget;
 use shared_mem::hand_eye::Matrix;
 use shared_mem::input::{self, Kind};
 use shared_mem::json;
-use shared_mem::lens::coefficients::Keys;
 use shared_mem::lens::listed::{ListedCamera, Numbers};
+use shared_mem::lens::spelling::Other;
 use shared_mem::recording::picture_size;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -31,7 +30,7 @@ struct File {
     table: Option<f64>,
     frames: Vec<Frame>,
     #[serde(flatten)]
-    others: BTreeMap<String, IgnoredAny>,
+    others: BTreeMap<String, Other>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -49,7 +48,7 @@ struct Frame {
     #[serde(flatten)]
     camera: Numbers,
     #[serde(flatten)]
-    others: BTreeMap<String, IgnoredAny>,
+    others: BTreeMap<String, Other>,
 }
 
 /// Keys of other programs that change nothing here: the volume and the exposure that their networks are trained with, numbers of
@@ -119,7 +118,7 @@ pub(crate) fn read(path: &Path) -> Result<List, ScanError> {
     let listed = file.frames.iter().map(|frame| {
         let picture = picture::path_of(&frame.file_path);
         let in_frame = |what: String| bad(format!("{}: {what}", picture.display()));
-        Keys::none_unread(frame.others.keys().map(String::as_str)).map_err(in_frame)?;
+        Numbers::none_unread(&frame.others).map_err(in_frame)?;
         let pixels = picture::found(folder, &picture);
         let size = || picture_size(&pixels).map_err(|error| format!("`w` and `h` are missing, and {error}"));
         let [width, height] = frame.camera.size(&file.camera, size).map_err(in_frame)?;
@@ -140,7 +139,7 @@ pub(crate) fn read(path: &Path) -> Result<List, ScanError> {
         })
     });
     let listed = listed.collect::<Result<_, ScanError>>()?;
-    Keys::none_unread(file.others.keys().map(String::as_str)).map_err(bad)?;
+    Numbers::none_unread(&file.others).map_err(bad)?;
     let of_robot = is_held || path.file_name().is_some_and(|name| name == "poses.json");
     if file.table.is_some_and(|height| !height.is_finite() || !of_robot) {
         return Err(bad(
@@ -154,8 +153,8 @@ pub(crate) fn read(path: &Path) -> Result<List, ScanError> {
 fn unread(file: &File) -> Vec<Remark> {
     let frames = file.frames.iter().flat_map(|frame| frame.others.keys());
     let names: BTreeSet<&str> = file.others.keys().chain(frames).map(String::as_str).collect();
-    let names: Vec<String> =
-        names.into_iter().filter(|name| !PASSED_OVER.contains(name)).map(|name| format!("`{name}`")).collect();
+    let is_unread = |name: &&str| !PASSED_OVER.contains(name) && !Numbers::is_read(name);
+    let names: Vec<String> = names.into_iter().filter(is_unread).map(|name| format!("`{name}`")).collect();
     if names.is_empty() {
         Vec::new()
     } else {
@@ -245,6 +244,11 @@ mod tests {
         let rows = read_text(&frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5]]")).expect("a scan");
         let seen = |list: &List| (list.listed[0].camera, list.listed[0].scan_from_camera);
         assert_eq!((seen(&rows), &rows.remarks), (seen(&full), &full.remarks));
+        assert_eq!(full.remarks, [], "all of its keys are read");
+        let fisheye =
+            frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5]]").replace("\"k1\"", "\"camera_type\": \"fisheye\", \"k1\"");
+        let lens = read_text(&fisheye).expect("a scan").listed[0].camera.lens;
+        assert_eq!(lens, Distortion::Fisheye([-0.1, 0.0, 0.0, 0.0]));
         let more =
             frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5]]").replace("\"k1\"", "\"aabb_scale\": 16, \"fog\": {}, \"k1\"");
         let read = read_text(&more).expect("a scan");
@@ -267,6 +271,9 @@ mod tests {
             (r#"{"fl_x": 640, "frames": [{"file_path": "a.png"}]}"#.into(), "`w` and `h` are missing"),
             (r#"{"fl_x": 640, "w": 9, "h": 9, "s1": 0.1, "frames": []}"#.into(), "`s1`"),
             (format!(r#"{{{HEAD}, "table": 0.1, "frames": []}}"#), "a robot's base frame"),
+            (format!(r#"{{{HEAD}, "distCoeffs": [0.1], "frames": []}}"#), "`distCoeffs`"),
+            (format!(r#"{{{HEAD}, "camera": {{"k2": 0.1}}, "frames": []}}"#), "`camera` holds `k2`"),
+            (frame("[[1,0,0,0],[0,1,0,0],[0,0,1,0]]").replace("\"k1\"", "\"camera_type\": \"omni\", \"k1\""), "`omni`"),
             ("{}".into(), "has no `frames`"),
         ];
         for (text, what) in cases {

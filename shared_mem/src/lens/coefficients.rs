@@ -7,8 +7,14 @@ use serde::Deserialize;
 /// Families that the models' names belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Family {
+    /// Nothing bends.
+    Straight,
+    /// A pinhole, which says nothing about the lens before it.
+    Pinhole,
     /// Two to five numbers of Brown and Conrady.
     Brown,
+    /// The same the other way round: read only where its numbers are zeros.
+    Inverse,
     /// OpenCV's quotient of two polynomials.
     Rational,
     /// Kannala and Brandt.
@@ -23,9 +29,12 @@ impl Family {
     /// By the name that ROS, OpenCV, Kalibr, COLMAP, nerfstudio or librealsense gives the model.
     fn of(name: &str) -> Result<Self, String> {
         let plain = name.trim().to_lowercase().replace(['-', ' '], "_");
-        Ok(match plain.strip_prefix("distortion.").unwrap_or(&plain) {
-            "plumb_bob" | "radtan" | "brown_conrady" | "opencv" | "radial" | "simple_radial" | "pinhole"
-            | "simple_pinhole" | "perspective" | "none" | "" => Self::Brown,
+        let bare = ["rs2_distortion_", "distortion."].iter().find_map(|start| plain.strip_prefix(start));
+        Ok(match bare.unwrap_or(&plain) {
+            "none" => Self::Straight,
+            "pinhole" | "simple_pinhole" | "perspective" => Self::Pinhole,
+            "plumb_bob" | "radtan" | "brown_conrady" | "opencv" | "radial" | "simple_radial" => Self::Brown,
+            "inverse_brown_conrady" | "modified_brown_conrady" => Self::Inverse,
             "rational_polynomial" | "rational" | "full_opencv" => Self::Rational,
             "equidistant"
             | "equi"
@@ -33,10 +42,81 @@ impl Family {
             | "opencv_fisheye"
             | "kannala_brandt"
             | "kannala_brandt4"
+            | "kannalabrandt8"
+            | "kb4"
+            | "kb8"
             | "radial_fisheye"
             | "simple_radial_fisheye" => Self::Fisheye,
             _ => return Err(format!("the lens model `{name}` is not known here; {REMEDY}")),
         })
+    }
+
+    /// The one that two names mean together; `None` where they contradict each other.
+    fn and(self, other: Self) -> Option<Self> {
+        match (self, other) {
+            (one, other) if one == other => Some(one),
+            (Self::Pinhole, lens) | (lens, Self::Pinhole) => Some(lens),
+            (Self::Brown, Self::Rational) | (Self::Rational, Self::Brown) => Some(Self::Rational),
+            _ => None,
+        }
+    }
+}
+
+/// A lens's model: its family, and the name that a file gives it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Model<'a> {
+    family: Family,
+    name: &'a str,
+}
+
+impl<'a> Model<'a> {
+    fn of(name: &'a str) -> Result<Self, String> {
+        Ok(Self { family: Family::of(name)?, name })
+    }
+
+    /// The one that all names of a file mean, each with the key that it stands under; `None` where no name says anything.
+    pub(super) fn agreed(names: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<Option<Self>, String> {
+        let mut agreed: Option<(&str, Self)> = None;
+        for (key, name) in names.into_iter().filter(|(_, name)| !name.trim().is_empty()) {
+            let model = Self::of(name).map_err(|what| {
+                // Two of the keys are everybody's.
+                let other = if key.starts_with("model") {
+                    format!("; leave `{key}` out if it is no lens's")
+                } else {
+                    String::new()
+                };
+                format!("`{key}`: {what}{other}")
+            })?;
+            let Some((before, other)) = agreed else {
+                agreed = Some((key, model));
+                continue;
+            };
+            let family = model.family.and(other.family).ok_or_else(|| {
+                format!(
+                    "`{before}` says `{}` and `{key}` says `{name}`, which are lenses of two kinds; leave the wrong one out",
+                    other.name
+                )
+            })?;
+            agreed = Some(if family == model.family { (key, model) } else { (before, other) });
+        }
+        Ok(agreed.map(|(_, model)| model))
+    }
+
+    /// Whether it says what the numbers of a list are.
+    pub(super) fn is_of_lens(&self) -> bool {
+        self.family != Family::Pinhole
+    }
+
+    /// Refuses numbers that are not zero where the model has none, or means by them what is not read.
+    fn none_bent(&self, is_bent: bool) -> Result<(), String> {
+        match self.family {
+            Family::Straight if is_bent => Err(format!(
+                "the lens model is `{}`, and numbers of distortion are given; name their model, or leave them out",
+                self.name
+            )),
+            Family::Inverse if is_bent => Err(format!("the lens model `{}` is not read here; {REMEDY}", self.name)),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -46,10 +126,15 @@ impl Family {
 /// # Errors
 /// A sentence that names what is not read.
 pub fn of_list(model: Option<&str>, list: &[f64]) -> Result<Distortion, String> {
+    let model = model.filter(|name| !name.trim().is_empty()).map(Model::of).transpose()?;
+    of_model(model.as_ref(), list)
+}
+
+/// The same of a model that is known already.
+pub(super) fn of_model(model: Option<&Model<'_>>, list: &[f64]) -> Result<Distortion, String> {
     if let Some(bad) = list.iter().find(|value| !value.is_finite()) {
         return Err(format!("a coefficient of the lens is {bad}; calibrate the camera again"));
     }
-    let family = model.map(Family::of).transpose()?;
     // Some programs fill a list up with zeros.
     let said = list.iter().rposition(|value| *value != 0.0).map_or(0, |last| last + 1);
     let beyond = |most: usize, name: &str| {
@@ -59,16 +144,19 @@ pub fn of_list(model: Option<&str>, list: &[f64]) -> Result<Distortion, String> 
         Err(format!("{} numbers of distortion are given, and the lens model `{name}` has {most}; {REMEDY}", list.len()))
     };
     let mut k = [0.0; 14];
-    match family {
-        Some(Family::Fisheye) => {
-            beyond(4, model.unwrap_or(""))?;
-            if list.len() < 4 {
-                return Err(format!("{} numbers of distortion are given, and a fisheye has 4", list.len()));
+    if let Some(model) = model {
+        model.none_bent(said > 0)?;
+        match model.family {
+            Family::Fisheye => {
+                beyond(4, model.name)?;
+                if list.len() < 4 {
+                    return Err(format!("{} numbers of distortion are given, and a fisheye has 4", list.len()));
+                }
+                return Ok(Distortion::Fisheye([list[0], list[1], list[2], list[3]]));
             }
-            return Ok(Distortion::Fisheye([list[0], list[1], list[2], list[3]]));
+            Family::Brown => beyond(5, model.name)?,
+            Family::Straight | Family::Pinhole | Family::Inverse | Family::Rational => {}
         }
-        Some(Family::Brown) => beyond(5, model.unwrap_or(""))?,
-        Some(Family::Rational) | None => {}
     }
     if ![0, 4, 5, 8, 12, 14].contains(&list.len()) && said > 0 {
         return Err(format!(
@@ -76,7 +164,7 @@ pub fn of_list(model: Option<&str>, list: &[f64]) -> Result<Distortion, String> 
             list.len()
         ));
     }
-    k[..said].copy_from_slice(&list[..said]);
+    k[..said.min(14)].copy_from_slice(&list[..said.min(14)]);
     match said {
         9..=12 => Err(format!("the lens has terms of a thin prism (s1 to s4), which are not read here; {REMEDY}")),
         13.. => Err(format!("the lens has terms of a tilted sensor (tau_x, tau_y), which are not read here; {REMEDY}")),
@@ -92,7 +180,12 @@ pub fn of_list(model: Option<&str>, list: &[f64]) -> Result<Distortion, String> 
 pub struct Keys {
     camera_model: Option<String>,
     distortion_model: Option<String>,
+    lens_model: Option<String>,
+    model: Option<String>,
+    model_type: Option<String>,
+    camera_type: Option<String>,
     is_fisheye: Option<bool>,
+    fisheye: Option<bool>,
     k1: Option<f64>,
     k2: Option<f64>,
     k3: Option<f64>,
@@ -103,35 +196,15 @@ pub struct Keys {
     p2: Option<f64>,
 }
 
-/// Keys that say something about a lens or its pinhole and are not read in lists of pictures.
-const UNREAD: [&str; 24] = [
-    "D",
-    "K",
-    "d",
-    "k",
-    "distortion",
-    "distortion_params",
-    "distortion_coefficients",
-    "distortion_coeffs",
-    "dist_coeffs",
-    "camera_matrix",
-    "intrinsics",
-    "intrinsic_matrix",
-    "xi",
-    "s1",
-    "s2",
-    "s3",
-    "s4",
-    "k7",
-    "k8",
-    "p3",
-    "p4",
-    "tau_x",
-    "tau_y",
-    "skew",
-];
-
 impl Keys {
+    /// Keys that are a text: the name of a model.
+    pub(super) const MODELS: [&str; 6] =
+        ["camera_model", "distortion_model", "lens_model", "model", "model_type", "camera_type"];
+    /// Keys that are true or false.
+    pub(super) const FLAGS: [&str; 2] = ["is_fisheye", "fisheye"];
+    /// Keys that are a number.
+    pub(super) const NUMBERS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
+
     /// These, and those of `common` where these say nothing.
     #[must_use]
     pub fn or(&self, common: &Self) -> Self {
@@ -139,7 +212,12 @@ impl Keys {
         Self {
             camera_model: text(&self.camera_model, &common.camera_model),
             distortion_model: text(&self.distortion_model, &common.distortion_model),
+            lens_model: text(&self.lens_model, &common.lens_model),
+            model: text(&self.model, &common.model),
+            model_type: text(&self.model_type, &common.model_type),
+            camera_type: text(&self.camera_type, &common.camera_type),
             is_fisheye: self.is_fisheye.or(common.is_fisheye),
+            fisheye: self.fisheye.or(common.fisheye),
             k1: self.k1.or(common.k1),
             k2: self.k2.or(common.k2),
             k3: self.k3.or(common.k3),
@@ -151,6 +229,22 @@ impl Keys {
         }
     }
 
+    /// The model that the names and the flags mean.
+    pub(super) fn model(&self) -> Result<Option<Model<'_>>, String> {
+        let texts = [
+            &self.camera_model,
+            &self.distortion_model,
+            &self.lens_model,
+            &self.model,
+            &self.model_type,
+            &self.camera_type,
+        ];
+        let names = Self::MODELS.into_iter().zip(texts).filter_map(|(key, name)| Some((key, name.as_deref()?)));
+        let flags = Self::FLAGS.into_iter().zip([self.is_fisheye, self.fisheye]);
+        let flags = flags.filter(|(_, is_set)| *is_set == Some(true)).map(|(key, _)| (key, "fisheye"));
+        Model::agreed(names.chain(flags))
+    }
+
     /// The lens.
     ///
     /// # Errors
@@ -158,11 +252,8 @@ impl Keys {
     pub fn distortion(&self) -> Result<Distortion, String> {
         let [k1, k2, k3, k4, k5, k6, p1, p2] =
             [self.k1, self.k2, self.k3, self.k4, self.k5, self.k6, self.p1, self.p2].map(|value| value.unwrap_or(0.0));
-        let model = self.distortion_model.as_deref().or(self.camera_model.as_deref());
-        let family = match self.is_fisheye {
-            Some(true) => Family::Fisheye,
-            _ => model.map_or(Ok(Family::Brown), Family::of)?,
-        };
+        let model = self.model()?;
+        let family = model.map_or(Family::Brown, |model| model.family);
         if family == Family::Fisheye {
             let others = [("p1", p1), ("p2", p2), ("k5", k5), ("k6", k6)];
             return match others.iter().find(|(_, value)| *value != 0.0) {
@@ -178,20 +269,10 @@ impl Keys {
                  rational model, or `camera_model` with OPENCV_FISHEYE for a fisheye; or {REMEDY}"
             ));
         }
-        of_list(Some("rational_polynomial"), &[k1, k2, p1, p2, k3, k4, k5, k6])
-    }
-
-    /// Refuses keys that speak of the lens and are not read.
-    ///
-    /// # Errors
-    /// A sentence that names the key.
-    pub fn none_unread<'a>(mut names: impl Iterator<Item = &'a str>) -> Result<(), String> {
-        match names.find(|name| UNREAD.contains(name)) {
-            None => Ok(()),
-            Some(name) => Err(format!(
-                "`{name}` is not read here: give the pinhole as `fl_x`, `fl_y`, `cx`, `cy` and the lens as `k1` to `k6`, `p1`, `p2` \
-                 with `camera_model`"
-            )),
+        let list = [k1, k2, p1, p2, k3, k4, k5, k6];
+        if let Some(model) = &model {
+            model.none_bent(list.iter().any(|value| *value != 0.0))?;
         }
+        of_list(Some("rational_polynomial"), &list)
     }
 }

@@ -4,7 +4,9 @@
 
 use super::Distortion;
 use super::coefficients::Keys;
+use super::spelling::{self, Other};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// What a list says of a camera, for all frames or for one.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -32,7 +34,33 @@ pub struct ListedCamera {
     pub lens: Distortion,
 }
 
+/// The keys of [`Numbers`], but for the lens's.
+const OWN: [&str; 8] = ["fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy", "w", "h"];
+
 impl Numbers {
+    /// Whether a key is read.
+    #[must_use]
+    pub fn is_read(key: &str) -> bool {
+        let of_lens = [&Keys::MODELS[..], &Keys::FLAGS, &Keys::NUMBERS].iter().any(|keys| keys.contains(&key));
+        of_lens || OWN.contains(&key)
+    }
+
+    /// Refuses keys that speak of the lens or its pinhole and are not read.
+    ///
+    /// # Errors
+    /// A sentence that names the key.
+    pub fn none_unread(others: &BTreeMap<String, Other>) -> Result<(), String> {
+        spelling::none_unread(others, Self::is_read)
+    }
+
+    /// The lens of a frame: by its own keys, and those of `all` frames where it has none.
+    ///
+    /// # Errors
+    /// A sentence that names what is not read.
+    pub fn distortion(&self, all: &Self) -> Result<Distortion, String> {
+        self.lens.or(&all.lens).distortion()
+    }
+
     /// Whether something is said about a focal length.
     #[must_use]
     pub fn has_focal(&self) -> bool {
@@ -56,7 +84,7 @@ impl Numbers {
     /// # Errors
     /// A sentence that names the key that is missing, or holds what cannot be.
     pub fn camera(&self, all: &Self, size: impl Fn() -> Result<[u32; 2], String>) -> Result<ListedCamera, String> {
-        let lens = self.lens.or(&all.lens).distortion()?;
+        let lens = self.distortion(all)?;
         let said = if self.has_focal() { self } else { all };
         let [x, y] = [
             Self::focal((said.fl_x, said.camera_angle_x), 0, &size)?,

@@ -146,8 +146,14 @@ fn keys_of_a_list_of_pictures_make_the_same_lenses() {
         let line = keys(text).expect_err("it is refused");
         assert!(line.contains(what), "{line}");
     }
-    assert!(Keys::none_unread(["frames", "aabb_scale"].into_iter()).is_ok());
-    assert!(Keys::none_unread(["frames", "s1"].into_iter()).expect_err("a thin prism").contains("`s1`"));
+    let both = r#"{"camera_model": "OPENCV_FISHEYE", "distortion_model": "plumb_bob", "k1": 0.1}"#;
+    assert!(keys(both).expect_err("a contradiction").contains("two kinds"));
+    let omni = r#"{"camera_model": "omni", "distortion_model": "radtan", "k1": 0.1}"#;
+    assert!(keys(omni).expect_err("another lens").contains("`omni`"));
+    for said in [r#""camera_type": "fisheye""#, r#""fisheye": true"#] {
+        let text = format!(r#"{{{said}, "k1": 0.1, "k2": 0, "k3": 0.2}}"#);
+        assert_eq!(keys(&text), Ok(Distortion::Fisheye([0.1, 0.0, 0.2, 0.0])));
+    }
 }
 
 #[test]

@@ -6,6 +6,7 @@ use super::error::ReadError;
 use super::joint_log::JointLog;
 use super::origins;
 use super::ros2::{JointState, StampedPose};
+use super::series::JointSeries;
 use super::torques;
 use super::tracked::{self, ObjectTopics, PoseRow};
 use crate::budget::Budget;
@@ -49,9 +50,24 @@ struct Poses {
 /// Reads a bag.
 pub(super) fn read<R: Read + Seek>(
     path: &Path,
+    messages: Messages<R>,
+    kind: ClipKind,
+    cell: &Cell,
+) -> Result<Clip, ReadError> {
+    clip(path, messages, kind, cell, true)
+}
+
+/// What the arm of a bag did, where it does not matter what it was told: the clip's other series are empty.
+pub(super) fn measured<R: Read + Seek>(path: &Path, messages: Messages<R>, cell: &Cell) -> Result<Clip, ReadError> {
+    clip(path, messages, ClipKind::Excitation, cell, false)
+}
+
+fn clip<R: Read + Seek>(
+    path: &Path,
     mut messages: Messages<R>,
     kind: ClipKind,
     cell: &Cell,
+    with_commands: bool,
 ) -> Result<Clip, ReadError> {
     let (mut collected, objects) = (Collected::default(), ObjectTopics::ros2(cell));
     let budget = messages.budget().clone();
@@ -65,8 +81,16 @@ pub(super) fn read<R: Read + Seek>(
     clip.origins = origins::read(&messages, false);
     clip.torques_end_at_rows = torques::end_at_rows(&messages, false);
     let missing = |topic: &str, wanted: Wanted| missing(path, topic, wanted, &messages);
+    if !with_commands {
+        // Two equal series are checked as one.
+        collected.desired = collected.measured.clone();
+    }
     if needs_arm || !collected.measured.is_empty() {
         collected.joints(&missing, cell, &mut clip)?;
+    }
+    if !with_commands {
+        clip.desired = JointSeries::default();
+        return Ok(clip);
     }
     let tracked = objects.take(&mut collected.poses);
     if kind != ClipKind::Excitation && tracked[0].2.rows.is_empty() {

@@ -21,7 +21,7 @@ pub(super) enum Wanted {
 const FAMILY: [&str; 4] = ["fr3", "fer", "panda", "franka"];
 
 /// Rows of one topic.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct JointLog {
     publishers: Vec<Publisher>,
     rows: usize,
@@ -31,7 +31,7 @@ pub(super) struct JointLog {
 }
 
 /// Rows that carry the same names.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Publisher {
     names: Vec<String>,
     log_times_ns: Vec<u64>,

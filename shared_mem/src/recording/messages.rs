@@ -71,6 +71,7 @@ pub enum Payload {
 pub struct ClipMessages {
     path: PathBuf,
     topics: Vec<String>,
+    is_of_pictures: bool,
     messages: Messages<BufReader<File>>,
 }
 
@@ -81,7 +82,12 @@ impl ClipMessages {
     /// [`ReadError`] when the file is missing or no MCAP file.
     pub fn open(path: &Path, topics: &[&str]) -> Result<Self, ReadError> {
         let topics = topics.iter().map(|&topic| topic.to_owned()).collect();
-        Ok(Self { path: path.to_owned(), topics, messages: Messages::open(path)? })
+        Ok(Self { path: path.to_owned(), topics, is_of_pictures: false, messages: Messages::open(path)? })
+    }
+
+    /// Opens a clip file for its pictures: a bag's cameras may have lenses that no clip holds.
+    pub(super) fn of_pictures(path: &Path) -> Result<Self, ReadError> {
+        Ok(Self { is_of_pictures: true, ..Self::open(path, &[])? })
     }
 
     /// The part of the file that could not be read so far; `None` while all is whole.
@@ -103,6 +109,9 @@ impl Iterator for ClipMessages {
             };
             let topic = &message.channel.topic;
             if !self.topics.is_empty() && !self.topics.contains(topic) {
+                continue;
+            }
+            if self.is_of_pictures && message.channel.type_name() == ros2::CAMERA_INFO {
                 continue;
             }
             match payload(&message) {

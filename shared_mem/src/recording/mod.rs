@@ -11,7 +11,7 @@
 //! | `read` | which kind of clip a file is, and reading it |
 //! | `own`, `logged` | an own recording as a clip, and what of its states to believe |
 //! | `messages`, `picture`, `picture_file`, `pictures` | all messages one by one, a picture, pictures as files, a clip's pictures |
-//! | `bag` | a ROS 2 bag as a clip |
+//! | `bag`, `cameras` | a ROS 2 bag as a clip, and what it says of its cameras |
 //! | `twinaligner`, `npy` | a TwinAligner folder as a clip |
 //! | `tracked` | objects by name, and the topics that they are on |
 //! | `controller_log` | commanded velocities and motor currents, made into positions and torques |
@@ -29,6 +29,7 @@
 //! | `subject` | of several objects the one that a command is about |
 
 mod bag;
+mod cameras;
 mod cdr;
 mod checks;
 mod clip;
@@ -64,6 +65,7 @@ mod twinaligner;
 mod wire;
 mod writer;
 
+pub use cameras::Cameras;
 pub use checks::few_rows;
 pub use clip::{Clip, TrackedObject};
 pub use definitions::definition as ros2_definition;

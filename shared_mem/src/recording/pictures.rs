@@ -28,7 +28,7 @@ pub fn for_pictures<E: From<ReadError>>(
     if path.is_dir() {
         return Ok(());
     }
-    for message in ClipMessages::open(path, &[])? {
+    for message in ClipMessages::of_pictures(path)? {
         let message = message?;
         if let Payload::Picture(picture) = &message.payload {
             let (stamp_ns, is_depth) = match picture {

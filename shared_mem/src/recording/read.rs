@@ -20,6 +20,21 @@ pub fn read_clip(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadE
     Ok(controller_log::in_positions_and_torques(as_logged(path, kind, cell)?, cell))
 }
 
+/// The same where only the arm's measured joints are wanted: neither commands nor objects have to be there.
+///
+/// # Errors
+/// As [`read_clip`], for the measured joints alone.
+pub(super) fn read_measured(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
+    if path.is_file() {
+        let mut messages = Messages::open(path)?;
+        let own = own::is_own(&messages) || messages.peek()?.is_some_and(|message| is_own(message.channel));
+        if !own {
+            return bag::measured(path, messages, cell);
+        }
+    }
+    read_clip(path, kind, cell)
+}
+
 /// A clip in the quantities that were logged.
 fn as_logged(path: &Path, kind: ClipKind, cell: &Cell) -> Result<Clip, ReadError> {
     if path.is_dir() {

@@ -4,6 +4,7 @@
 
 use super::cdr::{CdrError, CdrReader};
 use crate::lens::Distortion;
+use crate::lens::calibration::Calibration;
 use crate::lens::coefficients::of_list;
 use crate::msg::image::CameraInfo;
 
@@ -157,13 +158,29 @@ impl<'a> CameraCalibration<'a> {
         })
     }
 
+    /// The camera; a sentence for a lens that is not read. `None` where nobody calibrated it: all of its numbers are 0.
+    pub(super) fn calibration(&self) -> Result<Option<Calibration>, String> {
+        let [fx, _, cx, _, fy, cy, ..] = self.k;
+        if [fx, fy] == [0.0; 2] {
+            return Ok(None);
+        }
+        let size = [self.width as usize, self.height as usize];
+        Ok(Some(Calibration {
+            pinhole: Some([fx, fy, cx, cy]),
+            distortion: of_list(Some(self.model), &self.d)?,
+            size: (size != [0; 2]).then_some(size),
+            is_unnamed: false,
+        }))
+    }
+
     /// As the project's payload; a sentence for a lens that five coefficients do not describe. The pose is not known.
     pub(super) fn camera_info(&self) -> Result<CameraInfo, String> {
         let is_bent = self.d.iter().any(|d| *d != 0.0);
         let lens = if is_bent { of_list(Some(self.model), &self.d)? } else { Distortion::NONE };
         let distortion = lens.as_brown().ok_or_else(|| {
             format!(
-                "the lens model `{}` has more than the five numbers of plumb_bob; calibrate with plumb_bob",
+                "the lens model is `{}`, and a clip holds the five numbers of plumb_bob alone: leave this topic out of the bag \
+                 (`ros2 bag convert`) and put the lens into `[camera] distortion` of cell.toml",
                 self.model
             )
         })?;
@@ -344,7 +361,13 @@ mod tests {
         };
         let info = camera("plumb_bob", vec![0.1, 0.2, 0.0, 0.0, 0.3]).camera_info().expect("a pinhole");
         assert_eq!((info.intrinsics, info.distortion), ([600.0, 610.0, 320.0, 240.0], [0.1, 0.2, 0.0, 0.0, 0.3]));
-        assert!(camera("equidistant", vec![0.1; 4]).camera_info().is_err());
+        let fisheye = camera("equidistant", vec![0.1; 4]);
+        assert!(fisheye.camera_info().is_err_and(|line| line.contains("`equidistant`") && !line.contains("more than")));
+        let read = fisheye.calibration().expect("a lens").expect("a camera");
+        assert_eq!(
+            (read.pinhole, read.distortion),
+            (Some([600.0, 610.0, 320.0, 240.0]), Distortion::Fisheye([0.1; 4]))
+        );
         assert!(camera("rational_polynomial", vec![0.1; 8]).camera_info().is_err());
     }
 }

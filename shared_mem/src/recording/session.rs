@@ -91,6 +91,14 @@ impl Session {
     pub fn read(&self, clip: &ClipEntry) -> Result<super::Clip, ReadError> {
         super::read_clip(&self.folder.join(&clip.file), clip.kind, &self.cell)
     }
+
+    /// Reads the arm's measured joints of a clip alone: it may lack all else that a clip of its kind has.
+    ///
+    /// # Errors
+    /// As [`Session::read`], for the measured joints alone.
+    pub fn read_measured(&self, clip: &ClipEntry) -> Result<super::Clip, ReadError> {
+        super::read::read_measured(&self.folder.join(&clip.file), clip.kind, &self.cell)
+    }
 }
 
 /// The cell.toml that an own clip carries.
