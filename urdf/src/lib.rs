@@ -13,9 +13,11 @@
 //! | `tree` | from the stream of tags to links and joints, and which tags must be there |
 //! | `tag` | the attributes of one tag: names and numbers |
 //! | `dynamics` | a joint's friction and limits written into a file |
+//! | `elements` | links and joints added to a file or taken out of it |
 //! | `files` | meshes and textures named otherwise |
 
 mod dynamics;
+mod elements;
 mod files;
 mod tag;
 #[cfg(test)]
@@ -23,6 +25,7 @@ mod tests;
 mod tree;
 
 pub use dynamics::{with_dynamics, with_numbers};
+pub use elements::with_elements;
 pub use files::with_files;
 
 /// A robot: its links and joints in file order.

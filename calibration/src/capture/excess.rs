@@ -7,6 +7,8 @@ use std::fmt;
 pub enum Quantity {
     /// Joint position [rad].
     Position,
+    /// Position of a joint that slides [m].
+    Travel,
     /// Joint speed, which falls towards the stops [rad/s].
     Speed,
     /// Joint acceleration [rad/s²].
@@ -23,7 +25,7 @@ impl Quantity {
     /// Whether the same way, taken more slowly, comes with less of it.
     #[must_use]
     pub fn eases(self) -> bool {
-        !matches!(self, Self::Position | Self::Height)
+        !matches!(self, Self::Position | Self::Travel | Self::Height)
     }
 
     /// Its unit.
@@ -35,7 +37,7 @@ impl Quantity {
             Self::Acceleration => "rad/s²",
             Self::Jerk => "rad/s³",
             Self::Torque => "N m",
-            Self::Height => "m",
+            Self::Travel | Self::Height => "m",
         }
     }
 }
@@ -43,7 +45,7 @@ impl Quantity {
 impl fmt::Display for Quantity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Position => "position",
+            Self::Position | Self::Travel => "position",
             Self::Speed => "speed",
             Self::Acceleration => "acceleration",
             Self::Jerk => "jerk",

@@ -39,9 +39,10 @@ pub fn first_excess(points: &[SetPoint], limits: &[JointLimits], body: Option<&B
             let jerk = RATE * RATE * (after.dq_d[joint] - 2.0 * dq + before.dq_d[joint]);
             let [slowest, fastest] = limits.speed_bounds(q);
             let torque = tau.map_or(0.0, |tau| tau[joint].abs());
+            let position = if limits.slides { Quantity::Travel } else { Quantity::Position };
             let checks = [
-                (Quantity::Position, q, limits.q_max),
-                (Quantity::Position, -q, -limits.q_min),
+                (position, q, limits.q_max),
+                (position, -q, -limits.q_min),
                 (Quantity::Speed, dq, SHARE * fastest),
                 (Quantity::Speed, -dq, -SHARE * slowest),
                 (Quantity::Acceleration, ddq[joint].abs(), SHARE * limits.acceleration),

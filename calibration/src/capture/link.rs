@@ -2,7 +2,7 @@
 //!
 //! Knows no physics. A bridge that falls silent or starts anew is an error with its remedy, never a wait without end.
 
-use super::quality::{FAR, FAST, GAINS};
+use super::quality::{FAST, GAINS, LOOSE};
 use shared_mem::console;
 use shared_mem::msg::arm::{ArmMode, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
@@ -207,7 +207,7 @@ impl Link {
         }
         let joints = (0..described.min(state.q.len()))
             .map(|joint| (joint, (state.q_d[joint] - state.q[joint]).abs(), state.dq[joint].abs()));
-        let holds = |off: f64, speed: f64| off <= FAR && speed <= FAST;
+        let holds = |off: f64, speed: f64| off <= LOOSE && speed <= FAST;
         let loose = joints.filter(|(_, off, speed)| !holds(*off, *speed)).max_by(|a, b| a.2.total_cmp(&b.2));
         match loose {
             Some((joint, off, speed)) => Err(LinkError::DoesNotHold { joint, off, speed }),

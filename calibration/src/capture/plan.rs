@@ -14,7 +14,7 @@ use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::{JointLimits, JointState};
 
-/// Distance kept from the stops [rad].
+/// Distance kept from the stops [rad, or m of a joint that slides].
 const STOP_MARGIN: f64 = 0.05;
 /// Smallest amplitude worth recording [rad].
 const SMALLEST: f64 = 0.01;
@@ -48,10 +48,14 @@ impl Plan {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// The arm stands where no motion may start.
-    #[error("the arm stands outside the limits ({0}); move it away from there, then start again")]
+    #[error(
+        "the arm stands outside the limits ({0}); move it away from there, in a simulation by `q` of [simulation] in cell.toml, then start again"
+    )]
     Start(Excess),
     /// Not even a tiny motion fits.
-    #[error("no motion worth recording fits around this pose ({0}); move the arm away from there, then start again")]
+    #[error(
+        "no motion worth recording fits around this pose ({0}); move the arm away from there, in a simulation by `q` of [simulation] in cell.toml, then start again"
+    )]
     NoRoom(Excess),
 }
 
@@ -114,7 +118,8 @@ pub fn rest_excess(q: &Joints, floor: f64, limits: &[JointLimits], body: &Body) 
 fn position_excess(joint: usize, q: f64, limits: &JointLimits) -> Option<Excess> {
     let [lo, hi] = [limits.q_min + STOP_MARGIN, limits.q_max - STOP_MARGIN];
     let limit = if q < lo { lo } else { hi };
-    (!(lo..=hi).contains(&q)).then_some(Excess { joint: Some(joint), quantity: Quantity::Position, value: q, limit })
+    let quantity = if limits.slides { Quantity::Travel } else { Quantity::Position };
+    (!(lo..=hi).contains(&q)).then_some(Excess { joint: Some(joint), quantity, value: q, limit })
 }
 
 /// What torque and floor say about one moment.
@@ -353,6 +358,11 @@ mod tests {
         start[3] = -0.12;
         let error = plan(&request(start), &limits, &body).unwrap_err().to_string();
         assert!(error.contains("joint 4: position -0.1200 rad, limit -0.1669 rad"), "{error}");
+        assert!(error.contains("`q` of [simulation]"), "{error}");
+        let mut slides = limits;
+        slides[3].slides = true;
+        let error = plan(&request(start), &slides, &body).unwrap_err().to_string();
+        assert!(error.contains("joint 4: position -0.1200 m, limit -0.1669 m"), "{error}");
     }
 
     #[test]

@@ -12,8 +12,11 @@ const SPEED_EXPECTED: f64 = 0.5;
 /// factor of two, a velocity's noise within the other. Both are choices.
 const SPEED_BEYOND: f64 = 3.0;
 const SPEED_MORE: f64 = 0.5;
-/// An arm that is farther from its command does not follow it [rad]: a servo that gives way under a load hangs by less. A choice.
-pub(super) const FAR: f64 = 0.5;
+/// An arm that is farther from its command while it plays a clip does not follow it [rad, or m of a joint that slides]: hobby servos under a
+/// load hang by a tenth, and two of them are 20 cm at the end of a metre. A choice.
+const FAR: f64 = 0.2;
+/// An arm that is farther from its command at rest does not hold it [rad]. A choice.
+pub(super) const LOOSE: f64 = 0.5;
 /// An arm that turns faster does not hold still [rad/s]: the noise of a velocity stays below. A choice.
 pub(super) const FAST: f64 = 3.0;
 
@@ -98,7 +101,7 @@ impl Quality {
         }
         if let Some(error) = self.tracking_error.filter(|error| *error > FAR) {
             return Verdict::Repeat(format!(
-                "the arm was {error:.2} rad away from its command: it does not follow; {GAINS}"
+                "the arm was {error:.2} rad away from its command, more than {FAR} rad: it does not follow; {GAINS}"
             ));
         }
         Verdict::Keep
@@ -158,6 +161,7 @@ mod tests {
             (11_764.76, 0.1, "does not do as it is commanded"),
             (f64::NAN, 0.1, "does not do as it is commanded"),
             (1.2, 2.0, "does not follow"),
+            (1.2, 0.25, "more than 0.2 rad"),
             (1.2, f64::NAN, "does not follow"),
         ] {
             assert!(matches!(seen(dq, off), Verdict::Repeat(why) if why.contains(word)), "{dq} {off}");

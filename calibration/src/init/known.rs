@@ -302,13 +302,13 @@ fn without_limits(arm: &ArmModel) -> Option<String> {
     let named = |key: &str, limits: &[f64]| {
         let joints = arm.described_joint_names().iter().zip(limits).filter(|(_, limit)| limit.is_infinite());
         let joints: Vec<&str> = joints.map(|(name, _)| name.as_str()).collect();
-        (!joints.is_empty()).then(|| format!("`{key}` is 0 or missing for {}", joints.join(", ")))
+        (!joints.is_empty()).then(|| format!("no finite `{key}` above 0 for {}", joints.join(", ")))
     };
     let known = [named("effort", arm.torque_limit()), named("velocity", arm.velocity_limit())];
     let missing: Vec<String> = known.into_iter().flatten().collect();
     (!missing.is_empty()).then(|| {
         format!(
-            "<limit> of the URDF: {}: no limit is taken in its place, neither by the simulated arm nor by a capture's plan; write \
+            "<limit> of the URDF has {}: no limit is taken in its place, neither by the simulated arm nor by a capture's plan; write \
              the arm's own into the URDF, or its torques as `torque_limit` of [controller]",
             missing.join("; ")
         )

@@ -82,6 +82,9 @@ pub struct LeftOut {
     pub why: String,
 }
 
+/// Least moment of inertia of a body in a file [kg m²]: next to nothing, and simulators load it.
+pub(super) const LEAST_MOMENT: f64 = 1e-9;
+
 /// A number with ten digits that count; what is nothing but rounding is 0.
 pub(super) fn number(value: f64) -> String {
     if value.abs() < 1e-14 {

@@ -1,7 +1,7 @@
 //! SDF for Gazebo: a world with arm, object and table. Joint gains go into Gazebo's joint position controllers.
 
 use super::cell_model::{Arm, CellModel, Joint, Object};
-use super::known::{Line, number, numbers};
+use super::known::{LEAST_MOMENT, Line, number, numbers};
 use super::sheet::{Lacking, Sheet};
 use nalgebra::{Isometry3, Vector3};
 use twin::arm::MassProperties;
@@ -61,6 +61,7 @@ impl File {
     }
 
     fn inertial(&mut self, body: &MassProperties) {
+        let body = body.with_moments_from(LEAST_MOMENT);
         self.sheet.xml.open("inertial", &[]);
         self.pose(&Isometry3::translation(body.centre.x, body.centre.y, body.centre.z), None);
         self.value("mass", body.mass);

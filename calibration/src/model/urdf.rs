@@ -1,7 +1,7 @@
 //! URDF: arm, tool and loads. It knows neither controllers nor contacts nor objects: what of them was found is left out, and said.
 
 use super::cell_model::{Arm, CellModel, Joint};
-use super::known::{Line, number, numbers};
+use super::known::{LEAST_MOMENT, Line, number, numbers};
 use super::sheet::{Lacking, Sheet};
 use nalgebra::{Isometry3, Vector3};
 use twin::arm::MassProperties;
@@ -94,7 +94,8 @@ impl File {
 
     fn link(&mut self, name: &str, body: &MassProperties) {
         self.sheet.xml.open("link", &[("name", name.into())]);
-        if body.mass > 0.0 {
+        if body.mass > 0.0 || body.inertia.norm() > 0.0 {
+            let body = body.with_moments_from(LEAST_MOMENT);
             let i = |r: usize, c: usize| number(body.inertia[(r, c)]);
             self.sheet.xml.open("inertial", &[]);
             self.sheet

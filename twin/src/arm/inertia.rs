@@ -56,6 +56,17 @@ impl MassProperties {
         Self { mass, centre, inertia: moved(self) + moved(other) }
     }
 
+    /// The same with no principal moment of inertia below `least` [kg m²]: other programs refuse a body without one.
+    #[must_use]
+    pub fn with_moments_from(&self, least: f64) -> Self {
+        let mut own = self.inertia.symmetric_eigen();
+        if own.eigenvalues.iter().all(|moment| *moment >= least) {
+            return *self;
+        }
+        own.eigenvalues.apply(|moment| *moment = moment.max(least));
+        Self { inertia: own.recompose(), ..*self }
+    }
+
     /// The tool of cell.toml in the flange frame: a homogeneous capsule whose axis runs along z from the flange's
     /// origin to `length - radius`, closed by half spheres of `radius`.
     #[must_use]

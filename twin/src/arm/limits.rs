@@ -11,6 +11,8 @@ use shared_mem::cell::Cell;
 /// Limits of one joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointLimits {
+    /// Whether the joint slides: then m stand in place of rad, and N in place of N m.
+    pub slides: bool,
     /// Lowest position [rad].
     pub q_min: f64,
     /// Highest position [rad].
@@ -43,6 +45,7 @@ const JERK: f64 = 5000.0;
 impl JointLimits {
     /// A joint without limits: for the unused entries of an array.
     pub const FREE: Self = Self {
+        slides: false,
         q_min: f64::NEG_INFINITY,
         q_max: f64::INFINITY,
         velocity: f64::INFINITY,
@@ -112,6 +115,7 @@ impl Limits {
         let mut limits = Self { dof: arm.dof(), joints: [JointLimits::FREE; MAX_JOINTS] };
         for (i, joint) in limits.joints.iter_mut().enumerate().take(arm.dof()) {
             *joint = JointLimits {
+                slides: arm.links[i].slides,
                 q_min: arm.q_min()[i],
                 q_max: arm.q_max()[i],
                 velocity: arm.velocity_limit()[i],
@@ -139,6 +143,7 @@ impl Limits {
         for (number, (joint, other)) in (1..).zip(self.joints.iter_mut().zip(&other.joints)) {
             // `min` and `max` pass over a limit that is no number.
             *joint = JointLimits {
+                slides: joint.slides,
                 q_min: joint.q_min.max(other.q_min),
                 q_max: joint.q_max.min(other.q_max),
                 velocity: joint.velocity.min(other.velocity),

@@ -69,8 +69,8 @@ pub use shared_mem::msg::{Joints, MAX_JOINTS};
 pub use trailing::{Trail, Trailing};
 pub use transmission::{Passed, Spring, Transmission};
 pub use urdf::{
-    LinkFrame, UrdfBody, UrdfForm, UrdfFrames, UrdfJoint, UrdfShape, with_files_found_from, with_joint_friction,
-    with_joint_numbers,
+    LinkFrame, UrdfBody, UrdfForm, UrdfFrames, UrdfJoint, UrdfShape, with_elements, with_files_found_from,
+    with_joint_friction, with_joint_numbers,
 };
 pub use yielding::{FlangeMotion, Yielding};
 

@@ -6,6 +6,7 @@
 
 mod bodies;
 mod choice;
+mod doubts;
 mod frames;
 mod moving_base;
 
@@ -51,6 +52,21 @@ pub fn with_joint_numbers(
     urdf_rs::with_numbers(text, joint, tag, values).map_err(fault)
 }
 
+/// The text of a URDF with `more` before the end of its root, without those of its links and joints for which `drop` holds, by kind and
+/// name, and declared as the UTF-8 that it is; all else as it is. `file` names it in errors.
+///
+/// # Errors
+/// [`ModelError`] with the line, where it is no XML.
+pub fn with_elements(
+    text: &str,
+    file: &Path,
+    more: &str,
+    drop: &dyn Fn(&str, &str) -> bool,
+) -> Result<String, ModelError> {
+    urdf_rs::with_elements(text, more, drop)
+        .map_err(|error| ModelError::Read { path: file.to_owned(), what: error.to_string() })
+}
+
 /// The text of the URDF `file` as it finds its meshes and textures from the folder of `out`.
 ///
 /// # Errors
@@ -73,7 +89,8 @@ pub fn with_files_found_from(text: &str, file: &Path, out: &Path) -> Result<Stri
 /// Reads the serial chain of a URDF: of the `joints` with these names, or where they are none of its joints' names of those that
 /// it tells itself. The flange is the end of the fixed joints behind the last one, following the first of them in file order at each fork.
 pub(super) fn chain(file: &Path, joints: &[String]) -> Result<Chain, ModelError> {
-    chain_of(&input::text(file, input::Kind::Robot)?, file, joints)
+    // From the root, so that an error names the folder that was looked in.
+    chain_of(&input::text(&place::from_anywhere(file), input::Kind::Robot)?, file, joints)
 }
 
 /// The same of a text; `file` names it in errors.
@@ -143,11 +160,14 @@ impl<'a> Tree<'a> {
 
     fn chain(&self, named: &[String]) -> Result<Chain, ModelError> {
         let choice = self.choose(named)?;
+        if choice.joints.is_empty() && !self.robot.joints.iter().any(turns_or_slides) {
+            return Err(self.error(1, "no joint of it turns or slides, so that it is no arm; give an arm's URDF"));
+        }
         let mut chain = Chain {
             joints: Vec::new(),
             flange: Isometry3::identity(),
             held: self.held_beside(&choice),
-            doubts: choice.doubts,
+            doubts: self.odd_numbers(&choice.joints).into_iter().chain(choice.doubts).collect(),
         };
         let (mut link, mut next) = (self.root, choice.joints.into_iter());
         loop {
@@ -242,8 +262,7 @@ impl<'a> Tree<'a> {
         }
         let axis = self.axis(joint)?;
         let limit = &joint.limit;
-        let bounded = joint.joint_type != JointType::Continuous && limit.upper > limit.lower;
-        let position = if bounded { [limit.lower, limit.upper] } else { [f64::NEG_INFINITY, f64::INFINITY] };
+        let position = range(joint).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         Ok(Joint {
             name: joint.name.clone(),
             link: joint.child.link.clone(),
@@ -255,7 +274,7 @@ impl<'a> Tree<'a> {
             velocity: known_limit(limit.velocity),
             torque: known_limit(limit.effort),
             rotor_inertia: 0.0,
-            ready: if position[0] <= 0.0 && 0.0 <= position[1] { 0.0 } else { 0.5 * (position[0] + position[1]) },
+            ready: ready(position),
         })
     }
 
@@ -272,10 +291,29 @@ impl<'a> Tree<'a> {
     }
 }
 
+fn turns_or_slides(joint: &urdf_rs::Joint) -> bool {
+    matches!(joint.joint_type, JointType::Revolute | JointType::Continuous | JointType::Prismatic)
+}
+
+/// Least and largest position of a joint that has limits [rad or m]; swapped ones are turned round.
+fn range(joint: &urdf_rs::Joint) -> Option<[f64; 2]> {
+    let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+    (joint.joint_type != JointType::Continuous && lower != upper).then(|| [lower.min(upper), lower.max(upper)])
+}
+
 /// Where a joint is when nobody says where: at 0, or as near to it as its range allows.
 fn rest(joint: &urdf_rs::Joint) -> f64 {
-    let (lower, upper) = (joint.limit.lower, joint.limit.upper);
-    if joint.joint_type != JointType::Continuous && upper > lower { 0.0_f64.clamp(lower, upper) } else { 0.0 }
+    range(joint).map_or(0.0, |[lower, upper]| 0.0_f64.clamp(lower, upper))
+}
+
+/// Share of a range within which a joint stands at its end, and has no room for a motion to both sides. A choice.
+const EDGE: f64 = 0.1;
+
+/// Where an arm begins: at 0, or in the middle of a range that has 0 at its end or beyond.
+fn ready([lower, upper]: [f64; 2]) -> f64 {
+    let edge = EDGE * (upper - lower);
+    let has_room = !edge.is_finite() || lower + edge <= 0.0 && 0.0 <= upper - edge;
+    if has_room && lower <= 0.0 && 0.0 <= upper { 0.0 } else { 0.5 * (lower + upper) }
 }
 
 fn at_line(file: &Path, line: usize, what: &str) -> ModelError {

@@ -21,6 +21,7 @@ pub(super) fn chosen(cell: &[String], own: &[String], named: &[String]) -> anyho
         }
         return Ok(named.to_vec());
     }
+    ensure!(!own.is_empty(), "the model has no joint with a name that turns or slides; give the model of an arm");
     if cell.iter().all(|name| own.contains(name)) {
         return Ok(cell.to_vec());
     }

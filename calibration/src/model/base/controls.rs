@@ -1,6 +1,7 @@
 //! Actuators of the arm, replaced where they stand: each control stays where it was, and keeps its name.
 
 use super::classes::{ACTUATORS, Classes, MAIN, numbers};
+use super::places::beside_frames;
 use twin::xml::{Element, Node};
 
 /// What a control of the new model is.
@@ -8,12 +9,21 @@ use twin::xml::{Element, Node};
 pub(super) enum Control {
     /// The one that stood there, of an actuator that stays.
     Kept(usize),
-    /// A position of the user's joint at this place among the arm's, which the old control was as well.
-    PositionKept(usize, usize),
+    /// A position of the user's joint at the second place among the arm's, which the old control was as well, by this law.
+    PositionKept(usize, usize, Law),
     /// A position of the user's joint at this place among the arm's, in place of something else.
     Position(usize),
     /// A speed, or what counts for nothing.
     Nothing,
+}
+
+/// What position of its joint a control asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Law {
+    /// Position for each unit of the control [rad or m].
+    slope: f64,
+    /// Position at a control of 0 [rad or m].
+    offset: f64,
 }
 
 /// What became of the controls.
@@ -29,6 +39,8 @@ pub(super) struct Controls {
     pub(super) states_changed: bool,
     /// Whether any was replaced.
     pub(super) replaced: bool,
+    /// Actuators that stay and pull at the arm in another way than at one joint, by name.
+    pub(super) beside: Vec<String>,
 }
 
 /// Puts the cell's actuators in place of those of the arm's joints: `cell` names the joints in the cell, `own` in the user's model.
@@ -46,13 +58,15 @@ pub(super) fn replace(root: &mut Element, cell_root: &Element, cell: &[String], 
     let taken: Vec<&str> = old.iter().filter_map(|actuator| actuator.get("name")).collect();
     let mut actuators = Vec::new();
     for (place, actuator) in old.iter().enumerate() {
-        let drives = actuator.get("joint").or_else(|| actuator.get("jointinparent"));
-        let Some(joint) = drives.and_then(|drives| own.iter().position(|name| name == drives)) else {
+        let Some((joint, coef)) = driven(actuator, root, own) else {
+            if pulls_otherwise(actuator, root, own) {
+                done.beside.push(actuator.get("name").unwrap_or("without a name").to_owned());
+            }
             done.controls.push(Control::Kept(place));
             actuators.push(actuator.clone());
             continue;
         };
-        let moves = Control::of(actuator, &classes);
+        let law = Law::of(actuator, &classes, coef);
         done.states_changed |= has_state(actuator, &classes);
         if waiting[joint].is_empty() {
             done.removed.extend(actuator.get("name").map(str::to_owned));
@@ -60,9 +74,9 @@ pub(super) fn replace(root: &mut Element, cell_root: &Element, cell: &[String], 
         }
         let with = waiting[joint].remove(0);
         let is_position = is_position(&with);
-        done.controls.push(match (is_position, moves) {
-            (true, true) => Control::PositionKept(place, joint),
-            (true, false) => Control::Position(joint),
+        done.controls.push(match (is_position, law) {
+            (true, Some(law)) => Control::PositionKept(place, joint, law),
+            (true, None) => Control::Position(joint),
             (false, _) => Control::Nothing,
         });
         done.states_changed |= with.get("timeconst").is_some() || with.get("dyntype").is_some();
@@ -78,13 +92,8 @@ pub(super) fn replace(root: &mut Element, cell_root: &Element, cell: &[String], 
                 made.set(key, value);
             }
         }
-        if moves && is_position {
-            for key in ["ctrllimited", "ctrlrange"] {
-                made.remove(key);
-                if let Some(value) = actuator.get(key) {
-                    made.set(key, value);
-                }
-            }
+        if let (Some(law), true) = (law, is_position) {
+            law.limit(&mut made, actuator, &classes);
         }
         actuators.push(made);
     }
@@ -101,15 +110,87 @@ pub(super) fn replace(root: &mut Element, cell_root: &Element, cell: &[String], 
     done
 }
 
-impl Control {
-    /// Whether an actuator's control is a position of its joint.
-    fn of(actuator: &Element, classes: &Classes) -> bool {
+impl Law {
+    /// Of an actuator whose transmission moves by `coef` for each [rad or m] of its joint; `None` where its control is no position.
+    fn of(actuator: &Element, classes: &Classes, coef: f64) -> Option<Self> {
         let get = |key: &str| classes.get(actuator, MAIN, &ACTUATORS, key);
-        let gear = get("gear").map(|text| numbers(&text)).and_then(|gear| gear.first().copied()).unwrap_or(1.0);
-        let stiff = get("biasprm").map(|text| numbers(&text)).and_then(|bias| bias.get(1).copied()).unwrap_or(0.0);
-        let is_affine = get("biastype").is_some_and(|kind| kind == "affine");
-        gear == 1.0 && (actuator.name == "position" || actuator.name == "general" && is_affine && stiff < 0.0)
+        let list = |key: &str| get(key).map(|text| numbers(&text)).unwrap_or_default();
+        let is = |key: &str, kinds: &[&str]| get(key).is_none_or(|kind| kinds.contains(&kind.as_str()));
+        let at = |list: &[f64], place: usize, or: f64| list.get(place).copied().unwrap_or(or);
+        let (gain, bias) = (list("gainprm"), list("biasprm"));
+        let [gain, constant, stiff] = match actuator.name.as_str() {
+            "position" => [1.0, 0.0, 1.0],
+            "general" if get("biastype").is_some_and(|kind| kind == "affine") && is("gaintype", &["fixed"]) => {
+                [at(&gain, 0, 1.0), at(&bias, 0, 0.0), -at(&bias, 1, 0.0)]
+            }
+            _ => return None,
+        };
+        let moved = stiff * at(&list("gear"), 0, 1.0) * coef;
+        let is_law = stiff > 0.0 && moved != 0.0 && gain != 0.0 && is("dyntype", &["none", "filter", "filterexact"]);
+        is_law.then(|| Self { slope: gain / moved, offset: constant / moved })
     }
+
+    /// The position that a control asks for [rad or m].
+    pub(super) fn at(&self, control: f64) -> f64 {
+        self.slope * control + self.offset
+    }
+
+    /// Limits of the old control on the new one, which is a position.
+    fn limit(&self, made: &mut Element, old: &Element, classes: &Classes) {
+        if *self == (Self { slope: 1.0, offset: 0.0 }) {
+            for key in ["ctrllimited", "ctrlrange"] {
+                made.remove(key);
+                if let Some(value) = old.get(key) {
+                    made.set(key, value);
+                }
+            }
+            return;
+        }
+        let get = |key: &str| classes.get(old, MAIN, &ACTUATORS, key);
+        if let Some([one, other]) = get("ctrlrange").map(|text| numbers(&text)).as_deref() {
+            let (one, other) = (self.at(*one), self.at(*other));
+            made.set("ctrlrange", format!("{} {}", one.min(other), one.max(other)));
+            made.set("ctrllimited", get("ctrllimited").unwrap_or_else(|| "auto".into()));
+        }
+    }
+}
+
+/// The joint of the arm's that an actuator drives, itself or by a tendon of this joint alone, and how far its transmission moves with it.
+fn driven(actuator: &Element, root: &Element, own: &[String]) -> Option<(usize, f64)> {
+    let place = |joint: &str| own.iter().position(|name| name == joint);
+    if let Some(joint) = actuator.get("joint").or_else(|| actuator.get("jointinparent")) {
+        return place(joint).map(|place| (place, 1.0));
+    }
+    let tendon = tendon(root, actuator.get("tendon")?)?;
+    let joints: Vec<&Element> = tendon.elements().filter(|inner| inner.name == "joint").collect();
+    let [one] = joints[..] else { return None };
+    let coef = one.get("coef").map(numbers).and_then(|list| list.first().copied());
+    place(one.get("joint")?).map(|place| (place, coef.unwrap_or(1.0)))
+}
+
+/// Whether an actuator that drives no joint of the arm alone pulls at the arm: by a tendon over its joints or sites, or at a site.
+fn pulls_otherwise(actuator: &Element, root: &Element, own: &[String]) -> bool {
+    let has_joint = |body: &Element| {
+        beside_frames(body)
+            .iter()
+            .any(|e| e.name == "joint" && e.get("name").is_some_and(|name| own.iter().any(|own| own == name)))
+    };
+    let on_arm = |site: &str| {
+        let links = root.all().into_iter().filter(|body| body.name == "body" && has_joint(body));
+        links.flat_map(beside_frames).any(|e| e.name == "site" && e.get("name") == Some(site))
+    };
+    let pulled = actuator.get("tendon").and_then(|name| tendon(root, name)).is_some_and(|tendon| {
+        tendon.elements().any(|inner| {
+            inner.get("joint").is_some_and(|joint| own.iter().any(|own| own == joint))
+                || inner.get("site").is_some_and(on_arm)
+        })
+    });
+    pulled || actuator.get("site").is_some_and(on_arm)
+}
+
+fn tendon<'a>(root: &'a Element, name: &str) -> Option<&'a Element> {
+    let tendons = root.elements().filter(|section| section.name == "tendon").flat_map(Element::elements);
+    tendons.into_iter().find(|tendon| tendon.get("name") == Some(name))
 }
 
 /// Whether an actuator has a state of its own.

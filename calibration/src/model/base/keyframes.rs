@@ -70,7 +70,7 @@ fn key_of(key: &mut Element, controls: &Controls, shifts: &Shifts<'_>) -> Vec<&'
     {
         let of = |control: &Control| match control {
             Control::Kept(place) => old.get(*place).copied(),
-            Control::PositionKept(place, joint) => Some(old.get(*place)? + shifts.joints.get(*joint)?.1),
+            Control::PositionKept(place, joint, law) => Some(law.at(*old.get(*place)?) + shifts.joints.get(*joint)?.1),
             Control::Position(joint) => positions.as_ref()?.get(shifts.joints.get(*joint)?.0?).copied(),
             Control::Nothing => Some(0.0),
         };

@@ -2,9 +2,10 @@
 
 use super::controls::{self, Controls};
 use super::keyframes::{self, Shifts};
-use super::places::{self, Angles, Places};
-use super::{Base, LeftOut, Merging, arms, classes::numbers, source};
-use anyhow::ensure;
+use super::names;
+use super::places::{Angles, PlacedJoint, Places, beside_frames};
+use super::{Base, LeftOut, Merging, alike, arms, classes::numbers, source};
+use anyhow::{bail, ensure};
 use nalgebra::{Isometry3, Vector3};
 use std::collections::HashSet;
 use twin::xml::{Element, Node};
@@ -27,7 +28,19 @@ pub(super) fn merge(cell: &Element, base: &Base<'_>) -> anyhow::Result<(String, 
     let of_cell = joints_of(cell, &there);
     let own_joints = joints_of(&merging.root, &here);
     ensure!(!of_cell.is_empty(), "the cell has no arm; --base brings the arm of a model up to date");
+    if own_joints.is_empty() && merging.root.all().iter().any(|element| element.name == "attach") {
+        bail!(
+            "{} has its arm from another file by <attach>, which is not read: write it as one file first, in Python \
+             `mujoco.mj_saveLastXML(\"one.xml\", mujoco.MjModel.from_xml_path(\"{0}\"))`, and give that",
+            base.file.display()
+        );
+    }
     let own = arms::chosen(&of_cell, &own_joints, base.joints)?;
+    let mut cell = cell.clone();
+    let last = own.last().and_then(|joint| merging.root.all().into_iter().find(|body| moves_with(body, joint)));
+    let renamed = names::tell_apart(&mut cell, &merging.root, last);
+    merging.left_out.extend(renamed);
+    let cell = &cell;
     if own != of_cell {
         merging.lacks(
             format!("the cell's names of the joints ({})", of_cell.join(", ")),
@@ -40,15 +53,21 @@ pub(super) fn merge(cell: &Element, base: &Base<'_>) -> anyhow::Result<(String, 
     let (in_cell, in_own) = (placed(&there, &of_cell), placed(&here, &own));
     let flange = there.bodies.get("flange").copied();
     let frame = match flange {
-        Some(_) => places::base(&in_cell.iter().collect::<Vec<_>>(), &in_own.iter().collect::<Vec<_>>(), &own)?,
+        Some(_) => alike::base(&in_cell.iter().collect::<Vec<_>>(), &in_own.iter().collect::<Vec<_>>(), &own)?,
         None => Isometry3::identity(),
     };
-    let more = joints(&mut merging.root, cell, &of_cell, &own);
+    let more = joints(&mut merging.root, cell, &of_cell, &own, &in_own);
     weights(&mut merging.root, cell, &own);
     if let (Some(flange), Some(last)) = (flange, in_own.last()) {
         loads(&mut merging, cell, &(last.body.inverse() * frame * flange), own.last().map_or("", String::as_str));
     }
     let done = controls::replace(&mut merging.root, cell, &of_cell, &own);
+    for name in &done.beside {
+        merging.lacks(
+            format!("actuator {name}"),
+            "it stays, and pulls at the arm beside the cell's law; take it out where it is the arm's own",
+        );
+    }
     let added = surroundings(&mut merging, cell, &frame)?;
     contacts_and_sensors(&mut merging, cell, &frame, &own[0], &done);
     let addresses: Vec<(Option<usize>, f64)> =
@@ -77,17 +96,21 @@ fn is_called(element: &Element, kind: &str, name: &str) -> bool {
     element.name == kind && element.get("name") == Some(name)
 }
 
+/// Whether this is the body that a joint moves.
+fn moves_with(body: &Element, joint: &str) -> bool {
+    body.name == "body" && beside_frames(body).iter().any(|element| is_called(element, "joint", joint))
+}
+
 /// The body of the user's that this joint moves.
 fn body_of<'a>(root: &'a mut Element, joint: &str) -> Option<&'a mut Element> {
-    let moves = |body: &Element| beside_frames(body).iter().any(|element| is_called(element, "joint", joint));
-    root.find_mut(&|element| element.name == "body" && moves(element))
+    root.find_mut(&|element| moves_with(element, joint))
 }
 
 /// Gives the joints what the cell knows; how much more each one's position reads than before [rad or m].
-fn joints(root: &mut Element, cell: &Element, of_cell: &[String], own: &[String]) -> Vec<f64> {
+fn joints(root: &mut Element, cell: &Element, of_cell: &[String], own: &[String], placed: &[PlacedJoint]) -> Vec<f64> {
     let angles = Angles::of(root);
     let mut more = Vec::new();
-    for (theirs, name) in of_cell.iter().zip(own) {
+    for ((theirs, name), placed) in of_cell.iter().zip(own).zip(placed) {
         let new = cell.all().into_iter().find(|element| is_called(element, "joint", theirs));
         let old = root.find_mut(&|element| is_called(element, "joint", name) && element.get("joint1").is_none());
         let (Some(new), Some(old)) = (new, old) else { continue };
@@ -99,19 +122,14 @@ fn joints(root: &mut Element, cell: &Element, of_cell: &[String], own: &[String]
         if new.get("actuatorfrcrange").is_some() {
             old.set("actuatorfrclimited", "true");
         }
-        let slides = old.get("type") == Some("slide");
-        let unit = if angles.degrees && !slides { 1.0_f64.to_degrees() } else { 1.0 };
-        let reads =
-            |joint: &Element| joint.get("ref").map(numbers).and_then(|list| list.first().copied()).unwrap_or(0.0);
-        let shift = match new.get("ref") {
-            Some(_) => reads(new) - reads(old) / unit,
-            None => 0.0,
-        };
+        let unit = if angles.degrees && placed.kind != "slide" { 1.0_f64.to_degrees() } else { 1.0 };
+        let reads = new.get("ref").and_then(|text| numbers(text).first().copied());
+        let shift = reads.map_or(0.0, |reads| reads - placed.reads / unit);
         if shift != 0.0 {
-            old.set("ref", (reads(old) + shift * unit).to_string());
-            // A range is in what the encoder reads.
-            if let Some(range) = old.get("range").map(numbers).filter(|range| range.len() == 2) {
-                old.set("range", format!("{} {}", range[0] + shift * unit, range[1] + shift * unit));
+            old.set("ref", (placed.reads + shift * unit).to_string());
+            // A range is in what the encoder reads, its class's too.
+            if let [lower, upper] = placed.range[..] {
+                old.set("range", format!("{} {}", lower + shift * unit, upper + shift * unit));
             }
         }
         more.push(shift);
@@ -147,7 +165,9 @@ fn loads(merging: &mut Merging, cell: &Element, flange: &Isometry3<f64>, joint: 
         }
         put(&mut body, flange);
         if let Some(link) = body_of(&mut merging.root, joint) {
-            link.nodes.retain(|node| !matches!(node, Node::Element(old) if is_called(old, "body", &name)));
+            link.nodes.retain(
+                |node| !matches!(node, Node::Element(old) if is_called(old, "body", &name) && names::is_load(old)),
+            );
             link.nodes.push(Node::Element(body));
         }
     }
@@ -189,9 +209,13 @@ fn surroundings(merging: &mut Merging, cell: &Element, frame: &Isometry3<f64>) -
         put(&mut new, frame);
         let places = Angles::of(&Element::default()).frame(&new);
         let there = has(&new.name, &name);
-        let section = merging.root.elements_mut().find(|section| {
-            section.name == "worldbody" && (!there || section.elements().any(|old| is_called(old, &new.name, &name)))
-        });
+        // What is new stands behind all that is there: keyframes have its position at their end.
+        let section = match there {
+            false => Some(merging.root.last_or_new("worldbody")),
+            true => merging.root.elements_mut().find(|section| {
+                section.name == "worldbody" && section.elements().any(|old| is_called(old, &new.name, &name))
+            }),
+        };
         let Some(section) = section else {
             merging.lacks(
                 format!("{} {name}", new.name),
@@ -208,14 +232,14 @@ fn surroundings(merging: &mut Merging, cell: &Element, frame: &Isometry3<f64>) -
                         && old.elements().any(free),
                     "body `{name}` of the model does not move freely, as the cell's object of this name does; rename one of them"
                 );
-                // Where it is, in the file and in keyframes, is the user's.
-                for key in ["pos", "quat"] {
-                    new.remove(key);
+                let carries = old.elements().any(|inner| inner.name == "body");
+                names::into_object(old, new);
+                if carries {
+                    merging.lacks(
+                        format!("the mass of what body `{name}` of the model carries"),
+                        "it comes on top of the cell's, which is all of the object's: take it out there",
+                    );
                 }
-                for (key, value) in old.attributes.iter().filter(|(key, _)| key != "name") {
-                    new.set(key, value.clone());
-                }
-                *old = new;
             }
             Some(old) => *old = new,
             None => {
@@ -286,7 +310,7 @@ fn contacts_and_sensors(merging: &mut Merging, cell: &Element, frame: &Isometry3
     }
     let measures = merging.root.all().into_iter().any(|element| element.get("refname") == Some(BASE_SITE));
     if measures {
-        base_site(&mut merging.root, frame, first);
+        base_site(merging, frame, first);
     }
 }
 
@@ -303,7 +327,8 @@ fn into_section(root: &mut Element, kind: &str, new: Element) {
 }
 
 /// The cell's base frame as a site of the body that the arm stands on, where that has a name, else of the world.
-fn base_site(root: &mut Element, frame: &Isometry3<f64>, first: &str) {
+fn base_site(merging: &mut Merging, frame: &Isometry3<f64>, first: &str) {
+    let root = &mut merging.root;
     let here = Places::of(root);
     let is_stand = |body: &Element| {
         ["body", "worldbody"].contains(&body.name.as_str())
@@ -313,7 +338,9 @@ fn base_site(root: &mut Element, frame: &Isometry3<f64>, first: &str) {
     let at = stand.as_ref().and_then(|name| here.bodies.get(name)).copied().unwrap_or_else(Isometry3::identity);
     let mut site = Element::new("site", &[("name", BASE_SITE.into()), ("group", "4".into())]);
     put(&mut site, &(at.inverse() * frame));
+    let mut is_other = false;
     root.each_mut(&mut |body| {
+        is_other |= body.elements().any(|old| is_called(old, "site", BASE_SITE) && old.get("group") != Some("4"));
         body.nodes.retain(|node| !matches!(node, Node::Element(old) if is_called(old, "site", BASE_SITE)));
     });
     let holder = match &stand {
@@ -323,21 +350,12 @@ fn base_site(root: &mut Element, frame: &Isometry3<f64>, first: &str) {
     if let Some(holder) = holder {
         holder.nodes.push(Node::Element(site));
     }
-}
-
-/// What is in a body, in its frames as well.
-fn beside_frames(body: &Element) -> Vec<&Element> {
-    let (mut found, mut open) = (Vec::new(), vec![body]);
-    while let Some(element) = open.pop() {
-        for inner in element.elements() {
-            if inner.name == "frame" {
-                open.push(inner);
-            } else {
-                found.push(inner);
-            }
-        }
+    if is_other {
+        merging.lacks(
+            format!("site {BASE_SITE} of the model"),
+            "the cell's base frame stands in its place, for the cell's sensors; give yours another name",
+        );
     }
-    found
 }
 
 /// Free fall, where the base stands in the model as it does in the cell.

@@ -4,19 +4,25 @@
 //! |---|---|
 //! | `source` | the user's file with what it includes, and where its meshes lie from the new file |
 //! | `classes` | default classes of an MJCF: what an element has that does not say it itself |
-//! | `places` | where bodies and joints are, and the user's base frame in the cell's |
+//! | `places` | where bodies and joints are |
+//! | `alike` | where the user's arm stands, and why one is not built as the cell's |
+//! | `names` | other names for what the cell brings along, where the user's model has them already |
 //! | `arms` | which of the user's joints are the cell's |
 //! | `controls` | actuators, replaced where they stand |
 //! | `keyframes` | states that the user keeps, in the new order |
 //! | `mjcf`, `urdf` | each format from end to end |
 
+mod alike;
 mod arms;
 mod classes;
 mod controls;
 mod keyframes;
 mod mjcf;
+mod names;
 mod places;
 mod source;
+#[cfg(test)]
+mod test_clashes;
 #[cfg(test)]
 mod tests;
 mod urdf;

@@ -2,7 +2,6 @@
 //! world: by the axes of the joints, so that it does not matter in which frames either of them describes its links.
 
 use super::classes::{Classes, MAIN, numbers};
-use anyhow::{Context as _, ensure};
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::HashMap;
 use twin::xml::Element;
@@ -25,6 +24,16 @@ pub(super) struct PlacedJoint {
     pub(super) kind: String,
     /// Where its position begins in `qpos`; `None` behind elements of which MuJoCo makes several.
     pub(super) address: Option<usize>,
+    /// Its range as it is written, its class's where it has none itself; empty without one.
+    pub(super) range: Vec<f64>,
+    /// Its position where it stands in the file, as it is written.
+    pub(super) reads: f64,
+}
+
+impl PlacedJoint {
+    pub(super) fn new(body: Isometry3<f64>, point: Vector3<f64>, axis: Vector3<f64>, kind: &str) -> Self {
+        Self { point, axis, body, kind: kind.to_owned(), address: None, range: Vec::new(), reads: 0.0 }
+    }
 }
 
 /// What is placed, by name.
@@ -161,7 +170,10 @@ impl Places {
         let Some(name) = element.get("name") else { return };
         let axis = list("axis", Vector3::z()).try_normalize(1e-12).unwrap_or_else(Vector3::z);
         let point = at * nalgebra::Point3::from(list("pos", Vector3::zeros()));
-        let placed = PlacedJoint { point: point.coords, axis: at.rotation * axis, body: *at, kind, address };
+        let written = |key: &str| get(key).map(|text| numbers(&text)).unwrap_or_default();
+        let (range, reads) = (written("range"), written("ref").first().copied().unwrap_or(0.0));
+        let placed = PlacedJoint::new(*at, point.coords, at.rotation * axis, &kind);
+        let placed = PlacedJoint { address, range, reads, ..placed };
         self.joints.insert(name.to_owned(), placed);
     }
 }
@@ -169,22 +181,18 @@ impl Places {
 /// Where the cell's base frame lies in the user's world: the place at which the axes of the cell's joints are those of the user's.
 ///
 /// # Errors
-/// Where the arms are not built alike.
-pub(super) fn base(cell: &[&PlacedJoint], own: &[&PlacedJoint], names: &[String]) -> anyhow::Result<Isometry3<f64>> {
-    let (first, theirs) = own.first().zip(cell.first()).context("the cell has no joints")?;
+/// Where the arms are not built alike: the first joint whose axis is off, and by how much [m, rad].
+pub(super) fn fits(cell: &[&PlacedJoint], own: &[&PlacedJoint]) -> Result<Isometry3<f64>, (usize, [f64; 2])> {
+    let (Some(first), Some(theirs)) = (own.first(), cell.first()) else { return Ok(Isometry3::identity()) };
     let found = aligned(cell, own).unwrap_or_else(|| first.body * theirs.body.inverse());
-    for ((cell, own), name) in cell.iter().zip(own).zip(names) {
+    for (place, (cell, own)) in cell.iter().zip(own).enumerate() {
         let axis = found.rotation * cell.axis;
         let turned = axis.cross(&own.axis).norm().atan2(axis.dot(&own.axis));
         let apart = found * nalgebra::Point3::from(cell.point) - nalgebra::Point3::from(own.point);
         let apart = if own.kind == "slide" { 0.0 } else { apart.cross(&own.axis).norm() };
-        ensure!(
-            apart < OFF[0] && turned < OFF[1],
-            "the arm of the model is not built as the cell's: where their axes are brought together, that of `{name}` is {:.0} mm and {:.0} \
-             degrees off; say with --base-joints which joints of the model are the arm's, from base to flange",
-            apart * 1e3,
-            turned.to_degrees()
-        );
+        if !(apart < OFF[0] && turned < OFF[1]) {
+            return Err((place, [apart, turned]));
+        }
     }
     Ok(found)
 }
@@ -212,4 +220,19 @@ fn aligned(cell: &[&PlacedJoint], own: &[&PlacedJoint]) -> Option<Isometry3<f64>
     }
     let shift = across.try_inverse()? * wanted;
     Some(Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_rotation_matrix(&turn)))
+}
+
+/// What is in a body, in its frames as well.
+pub(super) fn beside_frames(body: &Element) -> Vec<&Element> {
+    let (mut found, mut open) = (Vec::new(), vec![body]);
+    while let Some(element) = open.pop() {
+        for inner in element.elements() {
+            if inner.name == "frame" {
+                open.push(inner);
+            } else {
+                found.push(inner);
+            }
+        }
+    }
+    found
 }

@@ -12,14 +12,14 @@ use std::path::Path;
 use twin::arm::ArmModel;
 use twin::xml::Element;
 
-fn shipped() -> Cell {
+pub(super) fn shipped() -> Cell {
     let text = include_str!("../../../../config/fr3_cell.toml");
     Cell::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file")
 }
 
 /// A laboratory's own model of the shipped arm: each link turned about its joint's axis, so that its frames are others; two fingers
 /// with a motor of their own; the base at `base`; `prefix` before the joints' names and `more` at the end.
-fn lab(base: &str, prefix: &str, more: &str) -> String {
+pub(super) fn lab(base: &str, prefix: &str, more: &str) -> String {
     let arm = ArmModel::from_cell(&shipped()).expect("the arm");
     let mut bodies = String::new();
     for (k, part) in arm.parts().iter().enumerate() {
@@ -53,7 +53,7 @@ fn lab(base: &str, prefix: &str, more: &str) -> String {
     )
 }
 
-fn merged(lab: &str, theta: &str, joints: &[&str]) -> Result<(ModelFile, Element), String> {
+pub(super) fn merged(lab: &str, theta: &str, joints: &[&str]) -> Result<(ModelFile, Element), String> {
     let folder = tempfile::tempdir().expect("a folder");
     let (file, out) = (folder.path().join("lab.xml"), folder.path().join("found.xml"));
     std::fs::write(&file, lab).expect("room");
@@ -65,14 +65,14 @@ fn merged(lab: &str, theta: &str, joints: &[&str]) -> Result<(ModelFile, Element
     Ok((model, root))
 }
 
-fn named<'a>(root: &'a Element, kind: &str, name: &str) -> &'a Element {
+pub(super) fn named<'a>(root: &'a Element, kind: &str, name: &str) -> &'a Element {
     let all = root.all();
     all.into_iter()
         .find(|e| e.name == kind && e.get("name") == Some(name))
         .unwrap_or_else(|| panic!("no {kind} {name}"))
 }
 
-fn actuators(root: &Element) -> Vec<&str> {
+pub(super) fn actuators(root: &Element) -> Vec<&str> {
     let section = root.elements().find(|element| element.name == "actuator").expect("actuators");
     section.elements().filter_map(|actuator| actuator.get("name")).collect()
 }

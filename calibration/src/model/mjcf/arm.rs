@@ -1,13 +1,15 @@
 //! The arm in MJCF: bodies, joints, tool and loads, and the actuators that are the controller.
 
 use super::super::cell_model::{Arm, Joint};
-use super::super::known::{Line, number, numbers};
+use super::super::known::{LEAST_MOMENT, Line, number, numbers};
 use super::{File, STEP, full, place};
 use nalgebra::Vector3;
 use twin::arm::MassProperties;
 
 /// `solimp` of dry friction. MuJoCo's own 0.9 gives a joint that begins to move nine times its inertia.
 const FRICTION_IMPEDANCE: f64 = 0.5;
+/// Of a body of which nothing is known, or nothing but its inertia [kg]: MuJoCo wants one.
+const LEAST_MASS: f64 = 1e-6;
 
 impl File {
     pub(super) fn arm(&mut self, arm: &Arm) {
@@ -48,22 +50,17 @@ impl File {
     }
 
     pub(super) fn inertial(&mut self, body: &MassProperties, is_known: bool) {
-        if is_known && body.mass > 0.0 {
-            self.sheet.xml.leaf(
-                "inertial",
-                &[
-                    ("mass", number(body.mass)),
-                    ("pos", numbers(body.centre.iter().copied())),
-                    ("fullinertia", full(&body.inertia)),
-                ],
-            );
-        } else {
-            // Next to nothing: what turns there is the armature.
-            self.sheet.xml.leaf(
-                "inertial",
-                &[("mass", "1e-6".into()), ("pos", "0 0 0".into()), ("diaginertia", "1e-9 1e-9 1e-9".into())],
-            );
-        }
+        // Of what is not known next to nothing stands there: what turns is the armature.
+        let known = if is_known { *body } else { MassProperties::default() };
+        let loads = known.with_moments_from(LEAST_MOMENT);
+        self.sheet.xml.leaf(
+            "inertial",
+            &[
+                ("mass", number(loads.mass.max(LEAST_MASS))),
+                ("pos", numbers(loads.centre.iter().copied())),
+                ("fullinertia", full(&loads.inertia)),
+            ],
+        );
     }
 
     fn joint(&mut self, joint: &Joint, compensates: bool) {

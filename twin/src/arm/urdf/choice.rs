@@ -7,16 +7,16 @@
 //! | a joint follows another one (`<mimic>`) | neither is the arm's, unless further joints hang on the one that leads |
 //! | a name: finger, thumb, jaw, knuckle, claw, gripper; wheel, caster | a finger, where arm joints come before it; a wheel |
 //! | the tool's frame (`tool0`, `tcp`, `ee_link`, ...) stays where it is while the joint moves | the arm ends before |
-//! | a floating or planar joint, or two slides and a turn without mass, at the root | a base that moves |
+//! | a floating or planar joint, or two slides and a turn next to without mass, at the root | a base that moves |
 //! | several branches, each short against the arm before them and with limits | a hand |
 //! | one slide by a few centimetres at the end of joints that turn | a finger |
 //! | one branch at least twice as long as all others | the arm goes on there |
 //!
 //! Where nothing of this tells, the user is asked.
 
-use super::Tree;
-use crate::arm::ModelError;
+use super::{Tree, range};
 use crate::arm::chain::HeldJoint;
+use crate::arm::{MAX_JOINTS, ModelError};
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use urdf_rs::{Joint, JointType};
@@ -27,6 +27,8 @@ const FINGER: [&str; 5] = ["finger", "thumb", "jaw", "knuckle", "claw"];
 const GRIPPER: &str = "gripper";
 /// Words of a joint that turns a whole hand.
 const TURNS: [&str; 8] = ["roll", "pitch", "yaw", "rotat", "wrist", "twist", "swivel", "turn"];
+/// Words of what is mounted at the end of an arm and moves by itself; all but the first in the link's name too.
+const MOUNTED: [&str; 8] = [GRIPPER, "camera", "lidar", "laser", "clamp", "spindle", "screw", "drill"];
 /// Words of what a vehicle stands on.
 const WHEEL: [&str; 4] = ["wheel", "caster", "castor", "sprocket"];
 /// Names, or parts of them, of the frame that a tool is mounted in, or that it works with.
@@ -162,6 +164,16 @@ impl<'a> Tree<'a> {
             link = &joint.child.link;
             choice.joints.push(joint);
         }
+        let of_base = self.perhaps_of_base();
+        if choice.joints.len() > of_base.len() && !of_base.is_empty() {
+            choice.doubts.push(format!(
+                "{} move over the floor and are taken as the arm's first joints; if they are a base's: --joints {} with `calibration init --urdf \
+                 {}`",
+                names(&of_base).join(", "),
+                names(&choice.joints[of_base.len()..]).join(","),
+                self.file.display()
+            ));
+        }
         Ok(choice)
     }
 
@@ -247,11 +259,12 @@ impl<'a> Tree<'a> {
                 choice.doubts.push(self.doubt(&slides, arm));
             }
             Some(travel) if joint.joint_type == JointType::Revolute && travel <= JAW_TURN => {
-                let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+                let [lower, upper] = range(joint).unwrap_or_default();
                 let known = arm.iter().map(|joint| joint.limit.effort).filter(|effort| *effort > 0.0);
                 let least = known.fold(f64::INFINITY, f64::min);
                 let is_weak = joint.limit.effort > 0.0 && joint.limit.effort < JAW_TORQUE * least && least.is_finite();
-                if is_weak && (lower >= -ONE_SIDE || upper <= ONE_SIDE) {
+                let opens = lower >= -ONE_SIDE || upper <= ONE_SIDE;
+                if is_weak && opens {
                     let what = format!(
                         "joint `{name}` may be the arm's last one, or a gripper's jaw: it opens to one side by {travel:.2} rad, with {} \
                          N m; {}",
@@ -260,18 +273,27 @@ impl<'a> Tree<'a> {
                     );
                     return Err(self.error(joint.line, &what));
                 }
+                if opens {
+                    choice.doubts.push(self.doubt(&format!("`{name}` opens to one side by {travel:.2} rad"), arm));
+                    return Ok(Some(joint));
+                }
             }
             _ => {}
         }
-        if contains(name, &[GRIPPER]) {
-            choice.doubts.push(self.doubt(&format!("`{name}` has the name of a gripper's joint that turns"), arm));
+        let word = MOUNTED
+            .iter()
+            .find(|word| contains(name, &[word]) || **word != GRIPPER && contains(&joint.child.link, &[word]));
+        if let Some(word) = word {
+            choice
+                .doubts
+                .push(self.doubt(&format!("`{name}` has the name of what is mounted on an arm ({word})"), arm));
         }
         Ok(Some(joint))
     }
 
     fn doubt(&self, what: &str, arm: &[&Joint]) -> String {
         format!(
-            "{what} and is taken as the arm's last joint; if it is a finger: --joints {} with `calibration init --urdf {}`",
+            "{what} and is taken as the arm's last joint; if it is none of the arm's: --joints {} with `calibration init --urdf {}`",
             names(arm).join(","),
             self.file.display()
         )
@@ -289,8 +311,8 @@ impl<'a> Tree<'a> {
     fn tie(&self, open: &[&'a Joint], link: &str, choice: &Choice<'a>) -> ModelError {
         let branches: Vec<_> = open.iter().map(|j| format!("`{}` (line {})", j.name, j.line)).collect();
         let line = open.first().map_or(1, |joint| joint.line);
-        let ways: Vec<Vec<&str>> =
-            open.iter().map(|joint| [names(&choice.joints), self.longest_way(joint)].concat()).collect();
+        let before = names(&choice.joints);
+        let ways: Vec<Vec<&str>> = open.iter().map(|joint| self.longest_way(&before, joint)).collect();
         let what = format!(
             "joints {} branch off link `{link}`, and either may be the arm's; {}",
             branches.join(" and "),
@@ -312,18 +334,36 @@ impl<'a> Tree<'a> {
         text
     }
 
-    /// Names of the joints on the longest way that begins with `joint`, up to what is named as fingers are.
-    fn longest_way(&self, joint: &'a Joint) -> Vec<&'a str> {
-        let (mut way, mut at) = (vec![joint.name.as_str()], joint);
+    /// Names of the joints on the longest way that begins with `joint`, up to what is named as fingers are, behind the joints `before`
+    /// it. A way of more joints than an arm has is cut where it branches: its longest stretch remains, with those before it that fit.
+    fn longest_way(&self, before: &[&'a str], joint: &'a Joint) -> Vec<&'a str> {
+        let (mut stretches, mut at) = (vec![before.to_vec(), vec![joint.name.as_str()]], joint);
         loop {
             let group = self.group(&at.child.link, false);
             let behind = group.moving.into_iter().filter(|joint| self.joints_from(joint) > 0 && part(joint).is_none());
-            let Some(next) = behind.max_by_key(|joint| (self.joints_from(joint), std::cmp::Reverse(joint.line))) else {
-                return way;
-            };
-            way.push(&next.name);
+            let behind: Vec<&Joint> = behind.collect();
+            let next = behind.iter().max_by_key(|joint| (self.joints_from(joint), std::cmp::Reverse(joint.line)));
+            let Some(next) = next.copied() else { break };
+            if behind.len() > 1 {
+                stretches.push(Vec::new());
+            }
+            stretches.last_mut().expect("two at least").push(&next.name);
             at = next;
         }
+        if stretches.iter().map(Vec::len).sum::<usize>() <= MAX_JOINTS {
+            return stretches.concat();
+        }
+        let longest = stretches.iter().map(Vec::len).max().unwrap_or(0);
+        let place = stretches.iter().position(|stretch| stretch.len() == longest).unwrap_or(0);
+        let mut way = stretches[place].clone();
+        way.truncate(MAX_JOINTS);
+        for stretch in stretches[..place].iter().rev() {
+            if stretch.len() + way.len() > MAX_JOINTS {
+                break;
+            }
+            way = [&stretch[..], &way[..]].concat();
+        }
+        way
     }
 
     /// All that is rigid with a link; at the `root` a base that moves counts as rigid.
@@ -385,8 +425,7 @@ fn quoted(names: &[&str]) -> String {
 
 /// How far a joint with limits moves [rad or m].
 fn travel(joint: &Joint) -> Option<f64> {
-    let travel = joint.limit.upper - joint.limit.lower;
-    (joint.joint_type != JointType::Continuous && travel > 0.0 && travel.is_finite()).then_some(travel)
+    range(joint).map(|[lower, upper]| upper - lower).filter(|travel| travel.is_finite())
 }
 
 fn contains(name: &str, words: &[&str]) -> bool {
