@@ -160,6 +160,41 @@ class BaseModel(unittest.TestCase):
         self.assertEqual(model.dof_frictionloss[model.joint("left_fr3_joint1").dofadr[0]], 0.2)
         self.assertEqual([model.actuator(i).name for i in (0, 7, 8)], ["left_motor1", "left_grip", "right_motor1"])
 
+    def test_a_keyframe_keeps_a_free_body_of_a_second_world(self):
+        cube = '<worldbody><body name="cube" pos="0.4 0.3 0.1"><freejoint/><geom name="cube" type="box" size="0.02 0.02 0.02"/></body></worldbody>'
+        qpos = " ".join(map(str, [*HOME, 0.04, 0.04, 0.4, 0.3, 0.02, 1, 0, 0, 0]))
+        text = lab(more=f'{cube}<keyframe><key name="home" qpos="{qpos}"/></keyframe>')
+        before = mujoco.MjModel.from_xml_string(text)
+        after, data = self.merged(text.replace("<worldbody>", '<worldbody><light pos="0 0 3"/></worldbody><worldbody>', 1))
+        mujoco.mj_resetDataKeyframe(after, data, 0)
+        mujoco.mj_forward(after, data)
+        there = mujoco.MjData(before)
+        mujoco.mj_resetDataKeyframe(before, there, 0)
+        mujoco.mj_forward(before, there)
+        for body in ("cube", "link7", "a"):
+            np.testing.assert_allclose(data.body(body).xpos, there.body(body).xpos, atol=1e-9)
+
+    def test_controls_in_degrees_with_an_offset_ask_for_the_same_positions(self):
+        qpos = " ".join(map(str, [*HOME, 0.04, 0.04]))
+        ctrl = " ".join(str(np.degrees(q) - 20) for q in HOME) + " 0.04"
+        law = f'gainprm="{2000 * np.pi / 180:.9f}" biastype="affine" biasprm="{2000 * np.radians(20):.9f} -2000 -200"'
+        text = lab(more=f'<keyframe><key name="home" qpos="{qpos}" ctrl="{ctrl}"/></keyframe>').replace(
+            'gainprm="2000" biastype="affine" biasprm="0 -2000 -200"', law).replace('ctrlrange="-2.9 2.9"', 'ctrlrange="-190 150"')
+        model, _ = self.merged(text)
+        np.testing.assert_allclose(model.key_ctrl[0][:7], HOME, atol=1e-6)
+        np.testing.assert_allclose(model.actuator_ctrlrange[:7], np.radians([[-170, 170]] * 7), atol=1e-6)
+
+    def test_names_of_the_model_that_the_cell_has_too(self):
+        more = ('<worldbody><geom name="object" size="0.1" pos="2 2 2"/><body name="payload" pos="1 0 1"><geom size="0.1" mass="1"/></body></worldbody>')
+        model, _ = self.merged(lab(more=more))
+        self.assertEqual((model.body("payload").mass[0], model.body("cell_payload").mass[0]), (1, 0.4))
+        rich = ('<worldbody><body name="object" pos="0.6 0.1 0.9"><freejoint name="free"/><geom name="og" type="box" size="0.05 0.05 0.05"/><site '
+                'name="grasp"/></body></worldbody><contact><pair geom1="og" geom2="table"/></contact><sensor><framepos name="gp" objtype="site" '
+                'objname="grasp"/></sensor>')
+        model, _ = self.merged(lab(more=rich))
+        np.testing.assert_allclose(model.body("object").pos, [0.6, 0.1, 0.9])
+        self.assertAlmostEqual(model.body("object").mass[0], self.cell.body("object").mass[0])
+
     def test_what_is_merged_once_more_stays_as_it_is(self):
         model, _ = self.merged(lab())
         with open(self.path("found.xml")) as stream:

@@ -226,3 +226,19 @@ fn a_motor_that_turns_against_its_joint_has_a_negative_constant() {
     let read = Cell::parse(&text, Path::new("cell.toml")).expect("a cell");
     assert_eq!(read.controller.expect("a controller").torque_constant, [32.0, 32.0, 45.0, -48.0]);
 }
+
+#[test]
+fn numbers_that_no_arm_has_are_remarked() {
+    let lab = tempfile::tempdir().expect("a folder");
+    for (limit, said) in [
+        ("lower='0' upper='0' effort='10' velocity='2'", "gives shoulder no range"),
+        ("lower='1' upper='-1' effort='10' velocity='2'", "above `upper` in <limit> of shoulder"),
+        ("lower='-170' upper='170' effort='10' velocity='2'", "limits in degrees"),
+        ("lower='-1' upper='1' effort='-10' velocity='inf'", "no finite `effort` above 0 for shoulder"),
+    ] {
+        let urdf = ARM.replace("lower='-1' upper='1' effort='10' velocity='2'", limit);
+        std::fs::write(lab.path().join("arm.urdf"), urdf).expect("room");
+        let (answer, _) = written(lab.path(), &["init", "--urdf", "arm.urdf", "--force"]);
+        assert!(answer["warnings"].to_string().contains(said), "{limit}: {answer}");
+    }
+}

@@ -152,8 +152,23 @@ fn the_joints_that_a_refusal_names_are_as_many_as_an_arm_has() {
 
 #[test]
 fn an_arm_begins_inside_of_its_ranges() {
-    for (limit, ready) in [(LIMIT, 0.0), ("<limit lower='0' upper='2' effort='80' velocity='2'/>", 1.0), ("", 0.0)] {
+    for (limit, ready) in [
+        (LIMIT, 0.0),
+        ("<limit lower='0' upper='2' effort='80' velocity='2'/>", 0.2),
+        ("<limit lower='-0.15' upper='0' effort='80' velocity='2'/>", -0.075),
+        ("<limit lower='-3' upper='-1' effort='80' velocity='2'/>", -2.0),
+        ("", 0.0),
+    ] {
         let found = read(&arm("root", limit, SOLID)).expect("an arm");
-        assert_eq!(found.ready()[2], ready, "{limit}");
+        assert!((found.ready()[2] - ready).abs() < 1e-12, "{limit}: {}", found.ready()[2]);
     }
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named_with_the_folder_that_was_looked_in() {
+    let robot = shared_mem::cell::Robot { urdf: Some("nowhere.urdf".into()), ..Default::default() };
+    let cell = shared_mem::cell::Cell { robot: Some(robot), ..Default::default() };
+    let error = ArmModel::from_cell(&cell).err().expect("there is none").to_string();
+    let here = std::env::current_dir().expect("a folder").join("nowhere.urdf");
+    assert!(error.contains(here.to_str().expect("UTF-8")), "{error}");
 }

@@ -306,14 +306,21 @@ fn rest(joint: &urdf_rs::Joint) -> f64 {
     range(joint).map_or(0.0, |[lower, upper]| 0.0_f64.clamp(lower, upper))
 }
 
-/// Share of a range within which a joint stands at its end, and has no room for a motion to both sides. A choice.
-const EDGE: f64 = 0.1;
+/// A joint nearer to an end of its range has no room for a motion to both sides: a share of the range, and a distance [rad or m]. Choices: a
+/// capture keeps 0.05 to the ends.
+const EDGE: [f64; 2] = [0.1, 0.1];
 
-/// Where an arm begins: at 0, or in the middle of a range that has 0 at its end or beyond.
+/// Where an arm begins: at 0, or as near to it as leaves room for a motion to both sides; in the middle of a range without 0.
 fn ready([lower, upper]: [f64; 2]) -> f64 {
-    let edge = EDGE * (upper - lower);
-    let has_room = !edge.is_finite() || lower + edge <= 0.0 && 0.0 <= upper - edge;
-    if has_room && lower <= 0.0 && 0.0 <= upper { 0.0 } else { 0.5 * (lower + upper) }
+    let travel = upper - lower;
+    if !travel.is_finite() {
+        return 0.0_f64.clamp(lower, upper);
+    }
+    if !(lower..=upper).contains(&0.0) {
+        return 0.5 * (lower + upper);
+    }
+    let edge = (EDGE[0] * travel).max(EDGE[1]).min(0.5 * travel);
+    0.0_f64.max(lower + edge).min(upper - edge)
 }
 
 fn at_line(file: &Path, line: usize, what: &str) -> ModelError {

@@ -7,6 +7,8 @@ use nalgebra::{Isometry3, Vector3};
 
 /// Axes are alike where their distances and angles are, within [m, rad].
 const ALIKE: [f64; 2] = [0.01, 0.05];
+/// Sine of the angle below which two axes are parallel: where they come nearest is everywhere, or far away.
+const PARALLEL: f64 = 0.1;
 
 /// Where the cell's base frame lies in the user's world; `names` are the user's of the joints.
 ///
@@ -53,22 +55,36 @@ fn turned_round(cell: &[&PlacedJoint], own: &[&PlacedJoint]) -> Option<Vec<usize
     })
 }
 
-/// The first joint of an arm whose neighbouring axes lie to each other as the cell's do, behind which the axis lies otherwise to the one before.
+/// The first joint of an arm of the cell's lengths, behind which the axis lies otherwise to the one before.
 fn zero_elsewhere(cell: &[&PlacedJoint], own: &[&PlacedJoint]) -> Option<usize> {
     let is_alike = |a: usize, b: usize| {
         let [cell, own] = [between(cell[a], cell[b]), between(own[a], own[b])];
         (cell[0] - own[0]).abs() < ALIKE[0] && (cell[1] - own[1]).abs() < ALIKE[1]
     };
-    let alike_beside = (1..cell.len()).all(|joint| is_alike(joint - 1, joint));
-    let first = (1..cell.len().saturating_sub(1)).find(|joint| !is_alike(joint - 1, joint + 1));
-    first.filter(|_| alike_beside)
+    let inner = || 1..cell.len().saturating_sub(1);
+    let is_as_long = |joint: usize| {
+        let of = |arm: &[&PlacedJoint]| along(arm[joint - 1], arm[joint], arm[joint + 1]);
+        of(cell).zip(of(own)).is_none_or(|(cell, own)| (cell - own).abs() < ALIKE[0])
+    };
+    let has_lengths = (1..cell.len()).all(|joint| is_alike(joint - 1, joint)) && inner().all(is_as_long);
+    inner().find(|joint| has_lengths && !is_alike(joint - 1, joint + 1))
+}
+
+/// How far apart on a joint's axis those before and behind it come nearest [m]; `None` where one of them is parallel to it.
+fn along(before: &PlacedJoint, joint: &PlacedJoint, behind: &PlacedJoint) -> Option<f64> {
+    let foot = |other: &PlacedJoint| {
+        let across = joint.axis.cross(&other.axis);
+        let apart = other.point - joint.point;
+        (across.norm() > PARALLEL).then(|| apart.cross(&other.axis).dot(&across) / across.norm_squared())
+    };
+    Some((foot(behind)? - foot(before)?).abs())
 }
 
 /// Distance of two axes [m] and the angle between them, without their signs [rad].
 fn between(one: &PlacedJoint, other: &PlacedJoint) -> [f64; 2] {
     let across: Vector3<f64> = one.axis.cross(&other.axis);
     let apart = other.point - one.point;
-    let distance = match across.try_normalize(1e-6) {
+    let distance = match across.try_normalize(PARALLEL) {
         Some(normal) => apart.dot(&normal).abs(),
         None => apart.cross(&one.axis).norm(),
     };

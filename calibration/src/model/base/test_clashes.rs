@@ -4,7 +4,7 @@ use super::super::{Format, write, write_into};
 use super::Base;
 use super::classes::numbers;
 use super::tests::{actuators, lab, merged, named, shipped};
-use nalgebra::{Isometry3, Translation3};
+use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use shared_mem::theta::Theta;
 use std::path::Path;
 use twin::xml::Element;
@@ -105,13 +105,20 @@ fn a_joint_that_turns_the_other_way_or_has_another_zero_is_named() {
     let turned = format!("{}{}{}", &base[..joint], against.join(" "), &base[joint + axis.len()..]);
     let refused = merged(&turned, "", &[]).expect_err("turned round");
     assert!(refused.contains("fr3_joint4 of the model turns the other way"), "{refused}");
-    let body = base.find("<body name='link3' pos='").expect("a body");
-    let elsewhere = format!("{}<frame euler='0 0 0'>{}", &base[..body], &base[body..]).replacen(
-        "</body></body></body></body>",
-        "</body></body></body></body></frame>",
-        1,
-    );
-    assert!(merged(&elsewhere, "", &[]).is_ok(), "a frame changes nothing");
+    // The body of joint 4 turned about its axis.
+    let link = base.find("<body name='link3' pos='").expect("a body");
+    let quat = link + base[link..].find("quat='").expect("a turn") + "quat='".len();
+    let written = base[quat..].split('\'').next().expect("its end");
+    let [w, x, y, z] = numbers(written)[..] else { panic!("{written}") };
+    let axis = Unit::new_normalize(Vector3::from_column_slice(&numbers(axis)));
+    let turn = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)) * UnitQuaternion::from_axis_angle(&axis, 0.5);
+    let turn = format!("{} {} {} {}", turn.w, turn.i, turn.j, turn.k);
+    let elsewhere = format!("{}{turn}{}", &base[..quat], &base[quat + written.len()..]);
+    let refused = merged(&elsewhere, "", &[]).expect_err("another zero");
+    assert!(refused.contains("zero of `fr3_joint4`"), "{refused}");
+    let longer = base.replace("<body name='link3' pos='", "<body name='link3' pos='0.5 0 0' user='");
+    let refused = merged(&longer, "", &[]).expect_err("another arm");
+    assert!(refused.contains("not built as the cell's"), "{refused}");
 }
 
 #[test]
@@ -149,7 +156,7 @@ fn loads_hang_at_the_cells_flange_before_the_end_of_the_root_and_once() {
         let joint = named(root, "joint", joint).clone();
         let at =
             joint.elements().find(|inner| inner.name == "origin").and_then(|origin| origin.get("xyz")).map(numbers);
-        Isometry3::from(Translation3::from(nalgebra::Vector3::from_column_slice(&at.expect("a place"))))
+        Isometry3::from(Translation3::from(Vector3::from_column_slice(&at.expect("a place"))))
     };
     let off = origin(&root, "payload_joint").translation.vector - origin(&root, "flange_joint").translation.vector;
     assert!(off.norm() < 1e-6, "{off:?}");
