@@ -168,7 +168,7 @@ fn an_arm_begins_inside_of_its_ranges() {
 fn a_file_that_is_not_there_is_named_with_the_folder_that_was_looked_in() {
     let robot = shared_mem::cell::Robot { urdf: Some("nowhere.urdf".into()), ..Default::default() };
     let cell = shared_mem::cell::Cell { robot: Some(robot), ..Default::default() };
-    let error = ArmModel::from_cell(&cell).err().expect("there is none").to_string();
+    let error = ArmModel::from_cell(&cell).expect_err("there is none").to_string();
     let here = std::env::current_dir().expect("a folder").join("nowhere.urdf");
     assert!(error.contains(here.to_str().expect("UTF-8")), "{error}");
 }

@@ -171,6 +171,6 @@ fn loads_hang_at_the_cells_flange_before_the_end_of_the_root_and_once() {
     );
     let at = bare.find("0.316").expect("a length");
     let longer = format!("{}0.516{}", &bare[..at], &bare[at + 5..]);
-    let refused = urdf_merged(&longer, &[]).err().expect("another arm");
+    let refused = urdf_merged(&longer, &[]).expect_err("another arm");
     assert!(refused.contains("not built as the cell's"), "{refused}");
 }
