@@ -32,7 +32,9 @@ const PARTS: [&str; 16] = [
 /// Names of the two columns of a stamp.
 const SECONDS: [&str; 4] = ["s", "sec", "secs", "seconds"];
 const NANOSECONDS: [&str; 5] = ["ns", "nsec", "nsecs", "nanosec", "nanoseconds"];
+const MICROSECONDS: [&str; 4] = ["us", "usec", "usecs", "microseconds"];
 const BILLION: f64 = 1e9;
+const MILLION: f64 = 1e6;
 /// Runs that are listed in a sentence.
 const LISTED: usize = 12;
 /// Stamps that begin anew do so within so many steps of the first one, and go on for so many rows.
@@ -46,9 +48,9 @@ pub(crate) fn apart(logs: Vec<Log>) -> Vec<Log> {
     let mut all: Vec<Log> = logs.into_iter().flat_map(windows::apart).flat_map(by_run).flat_map(by_stamps).collect();
     for log in &mut all {
         for table in log.tables.iter_mut().filter(|table| table.stamps_ns.is_none()) {
-            if let Some((seconds, nanoseconds, stamps_ns)) = stamps(table) {
+            if let Some(Parts { seconds, rest, unit, stamps_ns }) = stamps(table) {
                 log.facts.two_columns = Some(format!(
-                    "`{seconds}` and `{nanoseconds}` are the seconds and nanoseconds of one stamp: they rise together"
+                    "`{seconds}` and `{rest}` are the seconds and {unit} of one stamp: they rise together"
                 ));
                 table.stamps_ns = Some(stamps_ns);
             }
@@ -176,23 +178,43 @@ fn split(name: &str) -> Option<((String, u64), String)> {
     None
 }
 
-/// Two columns that are the seconds and nanoseconds of one stamp, and that stamp [ns].
-fn stamps(table: &Table) -> Option<(String, String, Vec<u64>)> {
+/// A stamp of two columns.
+struct Parts {
+    /// Name of the column of seconds.
+    seconds: String,
+    /// Name of the other.
+    rest: String,
+    /// What that counts.
+    unit: &'static str,
+    stamps_ns: Vec<u64>,
+}
+
+/// Two columns that are the seconds of one stamp and what is behind them, nanoseconds or microseconds.
+fn stamps(table: &Table) -> Option<Parts> {
     table.columns.windows(2).find_map(|pair| {
         let [seconds, nanoseconds] = pair else { return None };
         let last = |column: &Column| naming::words(&column.name).pop().unwrap_or_default();
-        let named = SECONDS.contains(&last(seconds).as_str()) && NANOSECONDS.contains(&last(nanoseconds).as_str());
+        let in_micro = MICROSECONDS.contains(&last(nanoseconds).as_str());
+        let in_nano = NANOSECONDS.contains(&last(nanoseconds).as_str());
+        let named = SECONDS.contains(&last(seconds).as_str()) && (in_nano || in_micro);
         let whole = |v: &f64| v.fract() == 0.0 && *v >= 0.0;
         let is_time = seconds.values.iter().all(|v| whole(v) && *v < 1e10 && (named || *v > RECENT))
             && nanoseconds.values.iter().all(|v| whole(v) && *v < BILLION);
         if !is_time || seconds.values.is_empty() {
             return None;
         }
+        // Behind seconds without names, no nanoseconds are all below a millisecond.
+        let is_micro = nanoseconds.values.iter().all(|v| *v < MILLION) && !in_nano;
+        let (unit, factor) = if is_micro { ("microseconds", 1000) } else { ("nanoseconds", 1) };
         let both = seconds.values.iter().zip(&nanoseconds.values);
-        let stamps: Vec<u64> = both.map(|(s, ns)| *s as u64 * 1_000_000_000 + *ns as u64).collect();
+        let stamps: Vec<u64> = both.map(|(s, rest)| *s as u64 * 1_000_000_000 + *rest as u64 * factor).collect();
         let rising = stamps.windows(2).filter(|w| w[1] > w[0]).count();
-        (stamps.len() > 1 && rising * 10 >= 9 * (stamps.len() - 1))
-            .then(|| (seconds.name.clone(), nanoseconds.name.clone(), stamps))
+        (stamps.len() > 1 && rising * 10 >= 9 * (stamps.len() - 1)).then(|| Parts {
+            seconds: seconds.name.clone(),
+            rest: nanoseconds.name.clone(),
+            unit,
+            stamps_ns: stamps,
+        })
     })
 }
 
@@ -265,9 +287,14 @@ mod tests {
             (["header.stamp.sec", "header.stamp.nanosec"], 0.0, true),
             (["column[1]", "column[2]"], 0.0, false),
         ] {
-            let stamps = stamps(&table(names, first)).map(|(_, _, stamps)| stamps);
+            let stamps = stamps(&table(names, first)).map(|parts| parts.stamps_ns);
             let expected = found.then(|| (0..30).map(|i| first as u64 * 1_000_000_000 + i * 100_000_000).collect());
             assert_eq!(stamps, expected, "{names:?}");
         }
+        let mut micro = table(["time_sec", "time_usec"], 0.0);
+        micro.columns[1].values.iter_mut().for_each(|v| *v *= 1e-3);
+        assert!(
+            stamps(&micro).is_some_and(|parts| parts.unit == "microseconds" && parts.stamps_ns[11] == 1_100_000_000)
+        );
     }
 }

@@ -161,7 +161,8 @@ fn a_unit_in_the_name_counts_and_one_that_nothing_tells_is_asked_for() {
         let lab = Lab::rows(&all);
         assert_eq!(lab.asked(), ["measured.q_unit"]);
         let file = lab.path("import.toml");
-        let text = std::fs::read_to_string(&file).expect("questions").replace("q_unit = \"not_known\"", "q_unit = \"rad\"");
+        let text =
+            std::fs::read_to_string(&file).expect("questions").replace("q_unit = \"not_known\"", "q_unit = \"rad\"");
         std::fs::write(&file, text).expect("room");
         assert!(matches!(lab.import(Some(&file)), Outcome::Done { .. }));
         assert!((lab.clip().measured.q_row(7)[2] - of(2, 0.07)).abs() < 1e-6);

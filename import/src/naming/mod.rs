@@ -209,6 +209,18 @@ pub(crate) fn are_pose(labels: &[String]) -> bool {
         || labels.iter().filter(|label| is_pose(label)).count() > 2
 }
 
+/// Which labels of a group are those of a pose that stands among joints: they share what stands before an `x`, `y` and `z`.
+pub(crate) fn pose_among(labels: &[String]) -> Vec<usize> {
+    let part = |label: &String| words(label).split_last().map(|(last, before)| (before.join(" "), last.clone()));
+    let parts: Vec<Option<(String, String)>> = labels.iter().map(part).collect();
+    let has = |before: &String, word: &str| parts.iter().flatten().any(|(own, last)| own == before && last == word);
+    let is_of_pose = |at: usize| {
+        let part = parts.get(at).and_then(Option::as_ref);
+        part.is_some_and(|(before, _)| ["x", "y", "z"].iter().all(|word| has(before, word)) && is_of_pose(&labels[at]))
+    };
+    (0..labels.len()).filter(|at| is_of_pose(*at)).collect()
+}
+
 /// Whether a column of this name counts time.
 pub(crate) fn is_time(name: &str) -> bool {
     let words = words(name);
@@ -308,6 +320,13 @@ mod tests {
         ] {
             assert_eq!(are_pose(&labels(list)), expected, "{list}");
         }
+    }
+
+    #[test]
+    fn a_pose_among_joints_is_told_from_them() {
+        let labels = ["tool_x", "tool_y", "tool_z", "tool_rx", "base", "wrist_roll"].map(str::to_owned);
+        assert_eq!(pose_among(&labels), [0, 1, 2, 3]);
+        assert!(pose_among(&labels[3..]).is_empty());
     }
 
     #[test]

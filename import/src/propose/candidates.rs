@@ -8,6 +8,8 @@ use std::collections::BTreeSet;
 
 /// Words of joints that are none of an arm's.
 const APART: [&str; 6] = ["finger", "gripper", "wheel", "caster", "knuckle", "mimic"];
+/// Fewer labels beside a pose are no arm, but a gripper.
+const FEWEST_JOINTS: usize = 3;
 /// Sines are looked for among so many groups behind one: cosines stand near them.
 const NEIGHBOURS: usize = 64;
 
@@ -93,7 +95,7 @@ pub(super) fn find<'a>(log: &'a Log, wanted: &[String]) -> Found<'a> {
                 found.unnamed.extend(nameless(table, group));
                 continue;
             };
-            let group = without_apart(group, wanted, &mut apart);
+            let group = without_pose(without_apart(group, wanted, &mut apart), wanted, &mut apart);
             if group.names.is_empty() {
                 continue;
             }
@@ -164,6 +166,24 @@ fn without_apart(group: Group, wanted: &[String], apart: &mut BTreeSet<String>) 
         let label = group.labels.get(place).filter(|label| !of_hand && !label.is_empty());
         apart.insert(label.unwrap_or(&group.base).clone());
     }
+    let pick = |list: &[String]| kept.iter().filter_map(|place| list.get(*place)).cloned().collect();
+    Group {
+        labels: pick(&group.labels),
+        names: pick(&group.names),
+        at: kept.iter().filter_map(|place| group.at.get(*place)).copied().collect(),
+        base: group.base,
+    }
+}
+
+/// The group without a pose that stands among its joints.
+fn without_pose(group: Group, wanted: &[String], apart: &mut BTreeSet<String>) -> Group {
+    let mut out = naming::pose_among(&group.labels);
+    out.retain(|place| !wanted.contains(&group.labels[*place]));
+    let kept: Vec<usize> = (0..group.labels.len()).filter(|place| !out.contains(place)).collect();
+    if out.is_empty() || kept.len() < FEWEST_JOINTS {
+        return group;
+    }
+    apart.extend(out.iter().map(|place| group.labels[*place].clone()));
     let pick = |list: &[String]| kept.iter().filter_map(|place| list.get(*place)).cloned().collect();
     Group {
         labels: pick(&group.labels),

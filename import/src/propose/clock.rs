@@ -46,7 +46,14 @@ pub(super) fn choose(log: &Log, table: &Table, block: &str, notes: &mut Notes) -
         return Clock { stamps: Some(HEADER.into()), ..Clock::default() };
     }
     let Some(column) = column(table) else {
-        let question = "the log has no stamps: how many rows a second?";
+        let question = match table.columns.iter().find_map(|column| Some((column, repeated(column)?))) {
+            Some((column, count)) => format!(
+                "`{}` gives {count} of {} rows the stamp of the row before: how many rows a second?",
+                column.name,
+                table.rows()
+            ),
+            None => "the log has no stamps: how many rows a second?".to_owned(),
+        };
         notes.open(&format!("{block}.rate"), question);
         return Clock::default();
     };
@@ -113,6 +120,14 @@ fn column(table: &Table) -> Option<&Column> {
     // When it was measured counts, and not when it was written down.
     let is_header = |name: &str| naming::words(name).windows(2).any(|pair| pair == ["header", "stamp"]);
     named.min_by_key(|column| (!is_header(&column.name), naming::words(&column.name).len())).or_else(|| ticking(table))
+}
+
+/// How many rows of a column of stamps have that of the row before, where it never falls.
+fn repeated(column: &Column) -> Option<usize> {
+    let falls = column.values.windows(2).any(|w| w[1] < w[0]);
+    let count = column.values.windows(2).filter(|w| w[1] == w[0]).count();
+    let rises = column.values.last() > column.values.first();
+    (naming::is_time(&column.name) && !falls && rises && count > 0).then_some(count)
 }
 
 /// The only column that rises by the same in every row, counts no rows and has no others of its kind: a joint that turns at one speed
@@ -195,6 +210,11 @@ mod tests {
         let found = choose(&Log::default(), &table, "measured", &mut notes);
         assert_eq!((found.stamps.as_deref(), found.unit), (Some("Zeit [s]"), TimeUnit::Second), "{:?}", notes.0);
         table.columns.pop();
+        let twice = Column { name: "time".into(), values: (0..100).map(|i| f64::from(i / 2)).collect() };
+        let coarse = Table { columns: vec![twice], ..Table::default() };
+        let mut notes = Notes::default();
+        choose(&Log::default(), &coarse, "measured", &mut notes);
+        assert!(notes.0[0].why.contains("`time` gives 50 of 100 rows"), "{:?}", notes.0);
         assert!(is_missing(&Log::default(), &table), "a counter of rows is no clock");
         let mut notes = Notes::default();
         choose(&Log::default(), &Table::default(), "measured", &mut notes);

@@ -73,7 +73,16 @@ impl Source {
 
 /// An error about a text that need not be a table: a person's notes, a program's log.
 fn notes(error: ImportError, path: &Path) -> ImportError {
+    let is_echoed = |start: Vec<u8>| {
+        let text = String::from_utf8_lossy(&start).into_owned();
+        text.starts_with("header:") || text.starts_with("---") || text.lines().any(|line| line.trim() == "stamp:")
+    };
     match error {
+        ImportError::Log { .. } if packed::start(path).is_ok_and(is_echoed) => ImportError::log(
+            path,
+            "is what `ros2 topic echo` or `rostopic echo` prints for people; record with `ros2 bag record`, or print with \
+             `ros2 topic echo --csv`, `rostopic echo -p`",
+        ),
         ImportError::Log { what, .. } if matches!(extension(path).as_str(), "txt" | "log") => {
             ImportError::log(path, format!("is no table of numbers: {what}"))
         }
@@ -175,6 +184,12 @@ fn of_file(path: &Path) -> Result<Option<Source>, ImportError> {
     let own = path.to_owned();
     let inside = extension(path);
     Ok(Some(match packed::start(path)?.as_slice() {
+        [] if std::fs::metadata(path).is_ok_and(|about| about.len() > 0) => {
+            return Err(ImportError::log(
+                path,
+                "is packed, and nothing comes out of it: it is cut or damaged; copy it from its source again",
+            ));
+        }
         [] => {
             return Err(ImportError::log(path, "is empty: its recorder ended before it wrote anything; leave it out"));
         }

@@ -34,8 +34,11 @@ pub(super) fn read(path: &Path, most: usize, budget: &Budget) -> Result<(usize, 
         Some(spent) => ImportError::budget(path)(spent),
         None => {
             let error = error.to_string().replace('\n', " ");
+            // A file without its end is named in plain words.
+            let cut = ["Corrupt footer", "Invalid Parquet", "EOF"].iter().any(|word| error.contains(word));
+            let error = if cut { String::new() } else { format!(" ({error})") };
             let what = format!(
-                "is no whole parquet file ({error}); copy it from its source again, or leave it out: one whose recorder did not \
+                "is no whole parquet file{error}; copy it from its source again, or leave it out: one whose recorder did not \
                  close it has no index, and cannot be read"
             );
             ImportError::log(path, what)
