@@ -91,23 +91,8 @@ pub enum Outcome {
 pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> Result<Outcome, ImportError> {
     let mut found = Found::at(order.files)?;
     let given = order.cell.map(Cell::read).transpose()?;
-    let mut first = None;
-    let (mapping, notes) = match order.mapping {
-        Some(path) => {
-            let mut mapping = Mapping::read(path)?.completed();
-            let mut notes = Vec::new();
-            // Units that no line names are proposed; what is asked before them is still open.
-            if mapping.open_line().is_some_and(|line| line.ends_with("_unit")) {
-                let (number, logs) = found.largest()?;
-                notes = units_of(longest(&logs, &found.paths()[number])?, &mut mapping);
-                first = Some((number, logs));
-            }
-            if let Some(line) = mapping.open_line() {
-                let what = format!("`{line}` is still to be filled in; its question stands above it");
-                return Err(ImportError::log(path, what));
-            }
-            (mapping, notes)
-        }
+    let (mapping, notes, mut first) = match order.mapping {
+        Some(path) => given_mapping(path, &mut found)?,
         None => {
             let (number, logs) = found.largest()?;
             let log = longest(&logs, &found.paths()[number])?;
@@ -118,8 +103,7 @@ pub fn import(order: Order<'_>, mut told: impl FnMut(&Imported, (u64, u64))) -> 
             if found.len() + logs.len() < ENOUGH_LOGS {
                 cut(log, &mut mapping, &mut notes);
             }
-            first = Some((number, logs));
-            (mapping, notes)
+            (mapping, notes, Some((number, logs)))
         }
     };
     let folder = session_folder(order.out, order.force, &found.paths())?;
@@ -178,6 +162,27 @@ fn with_left_out(mut notes: Vec<Note>, found: &Found) -> Vec<Note> {
         ..Note::default()
     }));
     notes
+}
+
+/// The number of a place and its logs, where they were read before their turn.
+type Read = Option<(usize, Vec<Log>)>;
+
+/// A mapping that was given, with the units that no line of it names and the reasons for them; and the logs that were read for those.
+fn given_mapping(path: &Path, found: &mut Found) -> Result<(Mapping, Vec<Note>, Read), ImportError> {
+    let mut mapping = Mapping::read(path)?.completed();
+    let (mut notes, mut read) = (Vec::new(), None);
+    // What is asked before the units is still open.
+    if mapping.open_line().is_some_and(|line| line.ends_with("_unit")) {
+        let (number, logs) = found.largest()?;
+        notes = units_of(longest(&logs, &found.paths()[number])?, &mut mapping);
+        read = Some((number, logs));
+    }
+    match mapping.open_line() {
+        Some(line) => {
+            Err(ImportError::log(path, format!("`{line}` is still to be filled in; its question stands above it")))
+        }
+        None => Ok((mapping, notes, read)),
+    }
 }
 
 pub(crate) fn longest<'a>(logs: &'a [Log], path: &Path) -> Result<&'a Log, ImportError> {

@@ -45,36 +45,19 @@ pub(super) fn choose<'a>(
         return Err(no_positions(&misfits, wanted, &refused, notes));
     };
     let first = best;
-    let rivals: Vec<&Judged<'a>> =
-        fitting.iter().skip(1).filter(|other| other.rank() == best.rank() && other.differs(best)).copied().collect();
-    // Of two that go the same way, the later one is what the arm did: whatever it is called, unless it says that it comes of the other.
-    for other in fitting.iter().skip(1) {
-        let derived =
-            naming::is_derived(&other.candidate.group.base) && !naming::is_derived(&best.candidate.group.base);
-        if !derived && best.leads(other) {
-            best = other;
-        }
-    }
+    best = later(best, &fitting);
     let is_later = !best.candidate.is_same(&first.candidate);
-    let ties = |best: &Judged<'a>| -> Vec<&Judged<'a>> {
-        let equal =
-            fitting.iter().filter(|other| !other.candidate.is_same(&best.candidate) && other.rank() == best.rank());
-        equal.filter(|other| other.differs(best) && !other.leads(best)).copied().collect()
-    };
-    // Commands beside one of them, for the same joints, name the arm.
-    let is_commanded = |judged: &Judged<'a>| {
-        let beside = |told: &&Judged<'a>| std::ptr::eq(told.candidate.table, judged.candidate.table);
-        let mut told = all.iter().filter(|told| told.candidate.role.desired).filter(beside);
-        judged.candidate.joints().is_some_and(|joints| told.any(|told| told.candidate.joints() == Some(joints)))
-    };
-    let tied = ties(best);
-    let commanded: Vec<&Judged<'a>> =
-        std::iter::once(best).chain(tied.iter().copied()).filter(|j| is_commanded(j)).collect();
-    let is_arm = !tied.is_empty() && commanded.len() == 1;
-    if is_arm {
-        best = commanded[0];
-    }
-    if !is_arm && !tied.is_empty() {
+    let tied: Vec<&Judged<'a>> = fitting
+        .iter()
+        .filter(|other| !other.candidate.is_same(&best.candidate) && other.rank() == best.rank())
+        .filter(|other| other.differs(best) && !other.leads(best))
+        .copied()
+        .collect();
+    let arm = only_commanded(all, best, &tied);
+    best = arm.unwrap_or(best);
+    if arm.is_none() && !tied.is_empty() {
+        let rivals =
+            fitting.iter().skip(1).filter(|other| other.rank() == first.rank() && other.differs(first)).copied();
         let names: Vec<String> = std::iter::once(fitting[0]).chain(rivals).map(|j| j.candidate.named()).collect();
         let what = format!(
             "as much speaks for {}: which are the arm's positions? One name a joint, and the table above",
@@ -89,7 +72,7 @@ pub(super) fn choose<'a>(
     }
     let others: Vec<&Judged<'a>> =
         fitting.into_iter().filter(|other| !other.candidate.is_same(&best.candidate)).take(LISTED).collect();
-    let reason = if is_arm {
+    let reason = if arm.is_some() {
         "commands for the same joints stand beside it"
     } else if is_later {
         "the later one of those that go the same way"
@@ -108,6 +91,29 @@ pub(super) fn choose<'a>(
     Ok(best.clone())
 }
 
+/// Of those that go the same way the latest, which is what the arm did: whatever it is called, unless it says that it comes of the other.
+fn later<'a, 'b>(best: &'b Judged<'a>, fitting: &[&'b Judged<'a>]) -> &'b Judged<'a> {
+    let is_derived = |judged: &Judged<'_>| naming::is_derived(&judged.candidate.group.base);
+    let mut latest = best;
+    for other in fitting.iter().skip(1) {
+        if (is_derived(latest) || !is_derived(other)) && latest.leads(other) {
+            latest = other;
+        }
+    }
+    latest
+}
+
+/// The only one of those for which as much speaks beside which commands for the same joints stand: they name the arm.
+fn only_commanded<'a, 'b>(all: &[Judged<'a>], best: &'b Judged<'a>, tied: &[&'b Judged<'a>]) -> Option<&'b Judged<'a>> {
+    let is_commanded = |judged: &Judged<'a>| {
+        let beside = |told: &&Judged<'a>| std::ptr::eq(told.candidate.table, judged.candidate.table);
+        let mut told = all.iter().filter(|told| told.candidate.role.desired).filter(beside);
+        judged.candidate.joints().is_some_and(|joints| told.any(|told| told.candidate.joints() == Some(joints)))
+    };
+    let mut commanded = std::iter::once(best).chain(tied.iter().copied()).filter(|judged| is_commanded(judged));
+    commanded.next().filter(|_| !tied.is_empty() && commanded.next().is_none())
+}
+
 /// What there is to say where no group is positions of the arm: a question, or that the log is of another arm.
 fn no_positions(misfits: &[&Judged<'_>], wanted: &[String], refused: &[String], notes: &mut Notes) -> Untaken {
     let there: Vec<String> = misfits.iter().map(|misfit| with_joints(misfit)).collect();
@@ -117,6 +123,8 @@ fn no_positions(misfits: &[&Judged<'_>], wanted: &[String], refused: &[String], 
         |misfit: &&Judged<'_>| misfit.candidate.joints().is_none() && misfit.candidate.size() > wanted.len();
     let what = if misfits.is_empty() {
         "which columns are the measured positions? One name a joint, of those at the end of this file".to_owned()
+    } else if let Some(several) = misfits.iter().find(|misfit| holds_several(misfit, wanted)) {
+        format!("{known}, and {} has them more than once: which columns are those of one arm?", with_joints(several))
     } else if misfits.iter().any(may_hold_it) {
         format!(
             "{known}, and the log has {}: which of these columns are its joints, in their order?",
@@ -138,6 +146,14 @@ fn fits(judged: &Judged<'_>, wanted: &[String]) -> bool {
             Some(names) => members::places(names, wanted).is_some(),
             None => judged.candidate.size() == wanted.len(),
         }
+}
+
+/// Whether each of the arm's joints is there more than once, under the names of several arms.
+fn holds_several(judged: &Judged<'_>, wanted: &[String]) -> bool {
+    let count = |joint: &String| {
+        judged.candidate.joints().into_iter().flatten().filter(|own| own.ends_with(joint.as_str())).count()
+    };
+    wanted.iter().all(|joint| count(joint) > 1)
 }
 
 fn with_joints(judged: &Judged<'_>) -> String {
