@@ -349,7 +349,7 @@ fn what_is_wrong_with_a_file_is_said_in_one_line() {
         (changed("format binary_little_endian 1.0\n", ""), "does not say its format"),
         (changed("vertex 2", "vertex 10000000"), "cut short"),
         (changed("vertex 2", "vertex 18446744073709551615"), "more rows"),
-        (changed("scale_2", "size"), "`scale_2`"),
+        (changed("scale_1", "size"), "`scale_1`"),
     ] {
         let error = SplatCloud::parse(&bytes).expect_err(told);
         assert!(error.contains(told) && !error.contains('\n'), "{error}");

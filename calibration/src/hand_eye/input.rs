@@ -281,7 +281,7 @@ fn recorded(source: &Source) -> anyhow::Result<Shots> {
         let pose = arm.flange(&q).isometry();
         Ok(Shot { name: shot.name, base_from_end_effector: pose, content: Content::Pixels(shot.pixels), size: None })
     });
-    let session::Known { camera: of_bag, remarks } = session::camera(&session, PictureKind::Color)?;
+    let session::OwnCamera { camera: of_bag, remarks } = session::camera(&session, PictureKind::Color)?;
     let of_bag = of_bag.and_then(|camera| Some((camera.pinhole?, camera.distortion)));
     let camera = match of_bag {
         Some(([fx, fy, cx, cy], distortion)) => {

@@ -72,7 +72,7 @@ pub fn shots(session: &Session, kind: PictureKind, wanted: usize) -> anyhow::Res
 
 /// The camera of a session's pictures.
 #[derive(Debug, Default)]
-pub struct Known {
+pub struct OwnCamera {
     /// By its bags, with the cell's own numbers where it has some; `None` where no bag says anything.
     pub camera: Option<Calibration>,
     /// What is to be said about it.
@@ -88,7 +88,7 @@ const WORTH_SAYING: f64 = 0.5;
 ///
 /// # Errors
 /// When a bag cannot be read, or cell and bags, or bags among themselves, are of different cameras.
-pub fn camera(session: &Session, kind: PictureKind) -> anyhow::Result<Known> {
+pub fn camera(session: &Session, kind: PictureKind) -> anyhow::Result<OwnCamera> {
     let mut said: Vec<(String, Result<Calibration, String>)> = Vec::new();
     for entry in &session.clips {
         for (topic, camera) in of_pictures(&Cameras::of(&session.folder.join(&entry.file))?, kind) {
@@ -100,11 +100,11 @@ pub fn camera(session: &Session, kind: PictureKind) -> anyhow::Result<Known> {
     let of_cell = session.cell.camera.as_ref();
     let intrinsics = of_cell.and_then(|camera| camera.intrinsics);
     let (topic, own) = match &said[..] {
-        [] => return Ok(Known::default()),
+        [] => return Ok(OwnCamera::default()),
         [(topic, Ok(own))] => (topic, own),
         [(topic, Err(what))] => {
             ensure!(intrinsics.is_some(), "`{topic}`: {what}; or give the lens in `[camera]` of cell.toml");
-            return Ok(Known { camera: None, remarks: vec![format!("`{topic}` was not read: {what}")] });
+            return Ok(OwnCamera { camera: None, remarks: vec![format!("`{topic}` was not read: {what}")] });
         }
         [(one, _), (other, _), ..] => {
             ensure!(
@@ -112,10 +112,10 @@ pub fn camera(session: &Session, kind: PictureKind) -> anyhow::Result<Known> {
                 "`{one}` and `{other}` say different cameras: give the one of the pictures in `[camera]` of cell.toml"
             );
             let what = format!("`{one}` and `{other}` say different cameras: `[camera]` of cell.toml was taken");
-            return Ok(Known { camera: None, remarks: vec![what] });
+            return Ok(OwnCamera { camera: None, remarks: vec![what] });
         }
     };
-    let Some([fx, fy, cx, cy]) = own.pinhole else { return Ok(Known::default()) };
+    let Some([fx, fy, cx, cy]) = own.pinhole else { return Ok(OwnCamera::default()) };
     let bag = CalibratedCamera { intrinsics: Intrinsics { fx, fy, cx, cy }, distortion: own.distortion };
     let lens = of_cell.map_or(Distortion::NONE, |camera| camera.distortion);
     let taken = CalibratedCamera {
@@ -138,7 +138,7 @@ pub fn camera(session: &Session, kind: PictureKind) -> anyhow::Result<Known> {
     }
     let Intrinsics { fx, fy, cx, cy } = taken.intrinsics;
     let camera = Calibration { pinhole: Some([fx, fy, cx, cy]), distortion: taken.distortion, ..*own };
-    Ok(Known { camera: Some(camera), remarks })
+    Ok(OwnCamera { camera: Some(camera), remarks })
 }
 
 /// Of a bag's cameras those of a kind of pictures; none where lens and turn were taken out of the pictures already.

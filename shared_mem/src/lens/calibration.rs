@@ -2,7 +2,7 @@
 //! table of it. The middle of the first pixel is at 0, 0.
 
 use super::Distortion;
-use super::coefficients::{Keys, Model, of_model};
+use super::coefficients::{Keys, Model, REMEDY, of_model};
 use super::spelling::{
     COEFFICIENTS, ELSEWHERE, MATRIX, PINHOLE, RESOLUTION, SIZE, TERMS, flattened, is_read, speaks_of_lens,
 };
@@ -35,7 +35,7 @@ impl Calibration {
         }
         if let Some(key) = file.keys().find(|key| speaks_of_lens(key) && !is_read(key)) {
             return Err(format!(
-                "`{key}` may be of the lens and is not read here: give the lens as `D` with `distortion_model`, and leave `{key}` out"
+                "`{key}` may be of a lens that is not read here: {REMEDY}; leave `{key}` out only where it says nothing about the lens"
             ));
         }
         let (pinhole, list) = (pinhole(file)?, one(file, &COEFFICIENTS)?);

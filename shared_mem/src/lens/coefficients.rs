@@ -22,7 +22,7 @@ enum Family {
 }
 
 /// What to do about a lens that is not read.
-const REMEDY: &str =
+pub(super) const REMEDY: &str =
     "calibrate with plumb_bob, rational_polynomial or equidistant (a fisheye), or undistort the pictures";
 
 impl Family {
