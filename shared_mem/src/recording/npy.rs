@@ -1,4 +1,4 @@
-//! NumPy's `.npy` files: little-endian floats and integers. Bytes in, numbers out.
+//! NumPy's `.npy` files: floats and integers of either byte order. Bytes in, numbers out.
 
 use crate::budget::{Budget, BudgetError};
 
@@ -31,7 +31,7 @@ impl From<&str> for ArrayError {
     }
 }
 
-/// Reads an array of little-endian numbers; `budget` is that of the file it stands in.
+/// Reads an array of numbers; `budget` is that of the file it stands in.
 ///
 /// # Errors
 /// [`ArrayError`] when it is cut, of another kind, or too large.
@@ -39,10 +39,10 @@ pub fn parse(bytes: &[u8], budget: &Budget) -> Result<Array, ArrayError> {
     let cut = ArrayError::Cut("is no complete .npy file; save it with numpy.save");
     let (header, data) = split(bytes).ok_or(cut)?;
     let descr = text_behind(header, "'descr':").and_then(|v| v.trim_start().strip_prefix('\'')?.split('\'').next());
-    let (size, number) = descr.and_then(kind).ok_or_else(|| {
+    let is_big_endian = descr.is_some_and(|descr| descr.starts_with('>'));
+    let (size, number) = descr.and_then(|descr| kind(&descr.replace('>', "<"))).ok_or_else(|| {
         let found = descr.unwrap_or("a record");
-        let what =
-            format!("holds numbers of type `{found}`; save arrays of float64, float32 or integers, little-endian");
+        let what = format!("holds numbers of type `{found}`; save arrays of float64, float32 or integers");
         ArrayError::Kind(what)
     })?;
     let order = text_behind(header, "'fortran_order':").map(str::trim_start).unwrap_or("");
@@ -60,7 +60,16 @@ pub fn parse(bytes: &[u8], budget: &Budget) -> Result<Array, ArrayError> {
     let cut = ArrayError::Cut("is cut: it holds fewer numbers than its shape");
     let data = needed.and_then(|needed| data.get(..needed)).ok_or(cut)?;
     budget.elements(data.len() / size, size_of::<f64>())?;
-    let mut values: Vec<f64> = data.chunks_exact(size).map(number).collect();
+    // Of the longest numbers; those of machines that count from the other end are turned round.
+    let mut turned = [0; 8];
+    let mut read = |bytes: &[u8]| match turned.get_mut(..size).filter(|_| is_big_endian) {
+        Some(turned) => {
+            turned.iter_mut().zip(bytes.iter().rev()).for_each(|(to, from)| *to = *from);
+            number(turned)
+        }
+        None => number(bytes),
+    };
+    let mut values: Vec<f64> = data.chunks_exact(size).map(&mut read).collect();
     match *shape.as_slice() {
         _ if !by_columns => {}
         [_] | [] => {}
@@ -133,6 +142,15 @@ mod tests {
         bytes.extend(header.as_bytes());
         bytes.extend(data);
         bytes
+    }
+
+    #[test]
+    fn numbers_of_machines_that_count_from_the_other_end_are_read() {
+        let doubles: Vec<u8> = [1.5f64, -2.0].iter().flat_map(|v| v.to_be_bytes()).collect();
+        let header = "{'descr': '>f8', 'fortran_order': False, 'shape': (2,), }\n";
+        assert_eq!(parse(&file(header, &doubles)).expect("an array").values, [1.5, -2.0]);
+        let header = "{'descr': '>i2', 'fortran_order': False, 'shape': (1,), }\n";
+        assert_eq!(parse(&file(header, &[1, 2])).expect("an array").values, [258.0]);
     }
 
     #[test]
