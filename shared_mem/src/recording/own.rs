@@ -234,6 +234,9 @@ fn take_joints(path: &Path, cell: &Cell, rows: Rows, clip: &mut Clip) -> Result<
     if apart {
         clip.warnings.extend(checks::gaps(&clip.desired.stamps_ns, told));
         clip.warnings.extend(checks::pair(&mut clip.desired, &mut clip.measured));
+    } else {
+        // Commands within the states.
+        clip.warnings.extend(checks::same_turn(&mut clip.desired, &clip.measured));
     }
     Ok(())
 }

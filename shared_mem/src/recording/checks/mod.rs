@@ -10,6 +10,7 @@ mod wraps;
 
 pub(super) use object::{beside_arm, object};
 pub(super) use outlying::find as outlying_rows;
+pub(super) use wraps::same_turn;
 
 use super::series::JointSeries;
 
@@ -51,7 +52,7 @@ pub(super) fn joints(
 /// Faults that only show when the two topics are laid side by side.
 pub(super) fn pair(desired: &mut JointSeries, measured: &mut JointSeries) -> Vec<String> {
     let mut warnings: Vec<String> = degrees::against_each_other(desired, measured).into_iter().collect();
-    warnings.extend(wraps::same_turn(desired, measured));
+    warnings.extend(same_turn(desired, measured));
     let (Some(d0), Some(d1)) = (desired.stamps_ns.first(), desired.stamps_ns.last()) else { return warnings };
     let (Some(m0), Some(m1)) = (measured.stamps_ns.first(), measured.stamps_ns.last()) else { return warnings };
     if d1 < m0 || m1 < d0 {

@@ -38,7 +38,7 @@ pub(super) fn unwrap(mut series: JointSeries, topic: &str, warnings: &mut Vec<St
 }
 
 /// Puts commands into the turn of the joint that follows them, where they are whole turns away in all rows.
-pub(super) fn same_turn(desired: &mut JointSeries, measured: &JointSeries) -> Option<String> {
+pub(in super::super) fn same_turn(desired: &mut JointSeries, measured: &JointSeries) -> Option<String> {
     let dof = desired.dof;
     if dof == 0 || measured.dof != dof || measured.is_empty() {
         return None;
