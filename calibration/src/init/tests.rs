@@ -146,7 +146,8 @@ fn a_recorded_controller_keeps_its_motors_under_another_law_and_that_is_said() {
     let info = shared_mem::recording::ClipInfo { cell_toml: Some(cell.to_toml()), ..Default::default() };
     let mut writer = shared_mem::recording::ClipWriter::create(&folder.path().join("a.mcap"), &info).expect("a file");
     for k in 0..50 {
-        let state = shared_mem::msg::arm::ArmState { stamp_ns: 1_000_000 * (1 + k), cycle: k, ..Default::default() };
+        let stamp_ns = 1_000_000 * (1 + k);
+        let state = shared_mem::msg::arm::ArmState { stamp_ns, cycle: k, dof: 7, ..Default::default() };
         writer.arm_state(&state).expect("room");
     }
     writer.finish().expect("a clip");

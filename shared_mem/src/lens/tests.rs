@@ -1,3 +1,5 @@
+//! Every lens, forward and back, against numbers of OpenCV and difference quotients.
+
 use super::Distortion;
 use super::coefficients::{Keys, of_list};
 

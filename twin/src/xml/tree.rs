@@ -1,6 +1,7 @@
 //! An XML document as a tree, to be changed and written again: elements, attributes, comments and text in their order.
 
 use super::Document;
+use quick_xml::escape::resolve_predefined_entity;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
@@ -75,7 +76,8 @@ impl Element {
                     done(&mut open, read);
                 }
                 Event::End(_) => {
-                    let Some(ended) = open.pop() else { return Err(fault("an end without a beginning".into())) };
+                    let Some(mut ended) = open.pop() else { return Err(fault("an end without a beginning".into())) };
+                    ended.trim();
                     done(&mut open, ended);
                 }
                 Event::Comment(comment) => {
@@ -83,10 +85,17 @@ impl Element {
                         parent.nodes.push(Node::Comment(comment.trim().to_owned()));
                     }
                 }
-                Event::Text(words) => {
-                    if let (Some(parent), false) = (open.last_mut(), words.trim().is_empty()) {
-                        parent.nodes.push(Node::Text(words.trim().to_owned()));
-                    }
+                Event::Text(words) => open.last_mut().into_iter().for_each(|parent| parent.add(&words)),
+                Event::CData(words) => open.last_mut().into_iter().for_each(|parent| parent.add(&words)),
+                // `&amp;`, `&#176;`: a part of the text around it.
+                Event::GeneralRef(reference) => {
+                    let sign = reference.resolve_char_ref().map_err(|error| fault(error.to_string()))?;
+                    let sign = sign.map(String::from);
+                    let named = || resolve_predefined_entity(&reference).map(str::to_owned);
+                    let Some(sign) = sign.or_else(named) else {
+                        return Err(fault(format!("`&{};` is no sign that XML knows", &*reference)));
+                    };
+                    open.last_mut().into_iter().for_each(|parent| parent.add(&sign));
                 }
                 Event::Eof => break,
                 _ => {}
@@ -97,6 +106,25 @@ impl Element {
             (_, false) => Err("its end is missing".into()),
             (None, true) => Err("it holds no element".into()),
         }
+    }
+
+    /// Text behind what is there already.
+    fn add(&mut self, words: &str) {
+        match self.nodes.last_mut() {
+            Some(Node::Text(text)) => text.push_str(words),
+            _ => self.nodes.push(Node::Text(words.to_owned())),
+        }
+    }
+
+    /// Takes blanks around texts off, and texts that are nothing else.
+    fn trim(&mut self) {
+        self.nodes.retain_mut(|node| match node {
+            Node::Text(text) => {
+                *text = text.trim().to_owned();
+                !text.is_empty()
+            }
+            _ => true,
+        });
     }
 
     /// The document whose root this is.
