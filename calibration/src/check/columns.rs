@@ -1,6 +1,7 @@
 //! A clip as typed columns: seconds from its first row, one list of numbers a joint. SI, base frame.
 
 use crate::forward::arm::noise;
+use nalgebra::Vector3;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, JointSeries, ObjectSeries};
 use shared_mem::time::seconds_between;
@@ -19,6 +20,11 @@ pub(super) struct Signals {
     /// One sigma of the noise of each joint's positions, from these [rad].
     pub(super) noise: Vec<f64>,
 }
+
+/// An object that is so far from its first place was pushed [m]: several times a tracker's noise.
+const PUSHED: f64 = 5e-3;
+/// It is touched so much earlier, at the speeds of strokes [s].
+const EARLIER: f64 = 0.05;
 
 /// A clip.
 #[derive(Debug, Clone)]
@@ -56,6 +62,14 @@ impl Columns {
             noticed: clip.warnings.clone(),
             damage: clip.damage.clone(),
         }
+    }
+
+    /// Until when the arm pushes nothing, as far as poses show: the object stands where it was first seen [s]; for ever where
+    /// there is none. What the object's weight and friction do to torques is not in the arm's model.
+    pub(super) fn before_contact(&self) -> f64 {
+        let places: Vec<Vector3<f64>> = self.object.poses.iter().map(|pose| pose.position().into()).collect();
+        let moved = places.iter().position(|place| (place - places[0]).norm() > PUSHED);
+        moved.and_then(|row| self.pose_t.get(row)).map_or(f64::INFINITY, |t| t - EARLIER)
     }
 
     /// A joint in words: its number and name.

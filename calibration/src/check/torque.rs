@@ -49,7 +49,7 @@ pub(super) struct Beside {
 
 /// Measured torques and the model's.
 pub(super) fn beside(clip: &Columns, arm: &ArmModel) -> Option<Beside> {
-    let moments = moments(&clip.measured, &clip.measured.t, &clip.measured.tau, arm.dof())?;
+    let moments = moments(clip, &clip.measured.t, &clip.measured.tau, arm.dof())?;
     let models: Vec<Model> = moments.iter().map(|moment| model(arm, moment)).collect();
     let column = |j: usize| [moments.iter().map(|m| m.tau[j]).collect(), models.iter().map(|m| m.tau[j]).collect()];
     Some(Beside { t: moments.iter().map(|m| m.t).collect(), joints: (0..arm.dof()).map(column).collect() })
@@ -58,10 +58,10 @@ pub(super) fn beside(clip: &Columns, arm: &ArmModel) -> Option<Beside> {
 /// Remarks on a clip.
 pub(super) fn remarks(clip: &Columns, arm: &ArmModel) -> Vec<Remark> {
     let mut found = Vec::new();
-    if let Some(moments) = moments(&clip.measured, &clip.measured.t, &clip.measured.tau, arm.dof()) {
+    if let Some(moments) = moments(clip, &clip.measured.t, &clip.measured.tau, arm.dof()) {
         found.extend(of_measured(clip, arm, &moments));
     }
-    if let Some(moments) = moments(&clip.measured, &clip.desired.t, &clip.desired.tau, arm.dof()) {
+    if let Some(moments) = moments(clip, &clip.desired.t, &clip.desired.tau, arm.dof()) {
         let models: Vec<Model> = moments.iter().map(|moment| model(arm, moment)).collect();
         let share = weight(arm, &moments, &models).map(|weight| weight.share(arm.free_fall()));
         found.extend(share.filter(|[share, half]| share - half > CARRIES_GRAVITY).map(|share| with(clip, share)));
@@ -132,15 +132,17 @@ fn weight(arm: &ArmModel, moments: &[Moment], models: &[Model]) -> Option<Weight
     Weight::of(&moments.iter().zip(models).map(of).collect::<Vec<_>>())
 }
 
-/// Moments of a clip: motion of the arm, and torques of a topic; `None` where too little is logged.
-fn moments(motion: &Signals, tau_t: &[f64], tau: &[Vec<f64>], dof: usize) -> Option<Vec<Moment>> {
+/// Moments of a clip before anything is pushed: motion of the arm, and torques of a topic; `None` where too little is logged.
+fn moments(clip: &Columns, tau_t: &[f64], tau: &[Vec<f64>], dof: usize) -> Option<Vec<Moment>> {
     // Of an arm at rest nobody can tell a placeholder from a torque, but one that holds zeros was never filled in.
+    let (motion, untouched) = (&clip.measured, clip.before_contact());
     let filled_in = tau.iter().flatten().any(|tau| *tau != 0.0);
     if tau.len() != dof || motion.dof() != dof || motion.len() < 20 || !filled_in {
         return None;
     }
     let half = ACCELERATION.max(2.0 * motion.step());
-    let stride = (motion.len() / TORQUE_ROWS).max(1);
+    let rows = motion.t.partition_point(|t| *t < untouched);
+    let stride = (rows / TORQUE_ROWS).max(1);
     let at = |row: usize| -> Option<Moment> {
         let t = motion.t[row];
         let (mut q, mut dq, mut ddq, mut out) =
@@ -164,7 +166,7 @@ fn moments(motion: &Signals, tau_t: &[f64], tau: &[Vec<f64>], dof: usize) -> Opt
         }
         Some(Moment { t, q, dq, ddq, tau: out })
     };
-    let moments: Vec<Moment> = (0..motion.len()).step_by(stride).filter_map(at).collect();
+    let moments: Vec<Moment> = (0..rows).step_by(stride).filter_map(at).collect();
     (moments.len() >= 20).then_some(moments)
 }
 
