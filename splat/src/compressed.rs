@@ -3,7 +3,8 @@
 
 use super::cloud::{Splat, SplatCloud};
 use super::harmonics::FIRST;
-use super::ply::{File, Kind, Read, degree, float, word};
+use super::ply::{File, Read, degree};
+use super::ply_rows::{Element, Kind, float, word};
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 
 const CHUNK: usize = 256;
@@ -63,7 +64,7 @@ pub(super) fn read(file: &File<'_>) -> Result<Read, String> {
 
 type Columns = [[[Option<usize>; 3]; 2]; 3];
 
-fn bounds_columns(chunks: &super::ply::Element) -> Result<Columns, String> {
+fn bounds_columns(chunks: &Element) -> Result<Columns, String> {
     let names = [["x", "y", "z"], ["scale_x", "scale_y", "scale_z"], ["r", "g", "b"]];
     let columns = names
         .map(|three| ["min", "max"].map(|end| three.map(|name| chunks.column(&format!("{end}_{name}"), Kind::Float))));

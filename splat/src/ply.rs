@@ -3,7 +3,7 @@
 //! logarithms, rotations `w, x, y, z`. 2D splats (Huang et al. 2024) have two scales: along the normal they have no extent.
 
 use super::cloud::{Splat, SplatCloud};
-use super::ply_rows::{self, Format};
+use super::ply_rows::{self, Column, Element, Format, Kind};
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 use std::borrow::Cow;
 
@@ -25,62 +25,11 @@ pub(super) struct File<'a> {
     pub(super) cut: Option<String>,
 }
 
-/// One table of the file.
-#[derive(Debug)]
-pub(super) struct Element {
-    pub(super) name: String,
-    /// Rows, and those that the header claims.
-    pub(super) count: usize,
-    claimed: usize,
-    /// Names and sizes of the columns [bytes].
-    columns: Vec<(String, Kind)>,
-    /// Where it begins among the rows [bytes].
-    begin: usize,
-}
-
 /// Splats, and what is to be said about them.
 #[derive(Debug, Default)]
 pub(super) struct Read {
     pub(super) cloud: SplatCloud,
     pub(super) remarks: Vec<String>,
-}
-
-/// Where a number stands in a row, and what it is.
-#[derive(Debug, Clone, Copy)]
-struct Column {
-    at: usize,
-    kind: Kind,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    Byte,
-    Short,
-    Word,
-    Float,
-    Double,
-}
-
-impl Kind {
-    fn parse(name: &str) -> Option<Self> {
-        Some(match name {
-            "char" | "uchar" | "int8" | "uint8" => Self::Byte,
-            "short" | "ushort" | "int16" | "uint16" => Self::Short,
-            "int" | "uint" | "int32" | "uint32" => Self::Word,
-            "float" | "float32" => Self::Float,
-            "double" | "float64" => Self::Double,
-            _ => return None,
-        })
-    }
-
-    pub(super) fn bytes(self) -> usize {
-        match self {
-            Self::Byte => 1,
-            Self::Short => 2,
-            Self::Word | Self::Float => 4,
-            Self::Double => 8,
-        }
-    }
 }
 
 /// The header's text, and where the rows begin. Lines end as the first one does: the bytes of a row may be anything.
@@ -176,59 +125,6 @@ impl<'a> File<'a> {
     pub(super) fn element(&self, name: &str) -> Option<&Element> {
         self.elements.iter().find(|element| element.name == name)
     }
-}
-
-impl Element {
-    pub(super) fn stride(&self) -> usize {
-        self.kinds().map(Kind::bytes).sum()
-    }
-
-    /// What its columns hold.
-    pub(super) fn kinds(&self) -> impl Iterator<Item = Kind> {
-        self.columns.iter().map(|(_, kind)| *kind)
-    }
-
-    /// Where a column of this type begins within a row [bytes].
-    pub(super) fn column(&self, wanted: &str, kind: Kind) -> Option<usize> {
-        self.find(wanted).filter(|column| column.kind == kind).map(|column| column.at)
-    }
-
-    fn find(&self, wanted: &str) -> Option<Column> {
-        let mut at = 0;
-        for (name, kind) in &self.columns {
-            if name == wanted {
-                return Some(Column { at, kind: *kind });
-            }
-            at += kind.bytes();
-        }
-        None
-    }
-
-    fn has(&self, wanted: &str) -> bool {
-        self.columns.iter().any(|(name, _)| name == wanted)
-    }
-}
-
-impl Column {
-    fn value(self, row: &[u8]) -> f32 {
-        match self.kind {
-            Kind::Double => {
-                let bytes = row.get(self.at..self.at + 8).and_then(|b| b.try_into().ok());
-                bytes.map_or(f32::NAN, |bytes| f64::from_le_bytes(bytes) as f32)
-            }
-            _ => float(row, self.at),
-        }
-    }
-}
-
-/// Four bytes of a row as a number.
-pub(super) fn float(row: &[u8], at: usize) -> f32 {
-    f32::from_bits(word(row, at))
-}
-
-/// Four bytes of a row as an unsigned number.
-pub(super) fn word(row: &[u8], at: usize) -> u32 {
-    row.get(at..at + 4).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes)
 }
 
 /// The splats of a file with the usual columns.

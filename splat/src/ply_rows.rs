@@ -1,7 +1,57 @@
-//! Rows of PLY files as binary little-endian ones, whatever the file's own format: big-endian numbers turned round, written-out
-//! numbers (ascii) parsed.
+//! Tables of PLY files: their columns, and their rows as binary little-endian ones, whatever the file's own format: big-endian
+//! numbers turned round, written-out numbers (ascii) parsed.
 
-use super::ply::{Element, Kind};
+/// One table of the file.
+#[derive(Debug)]
+pub(super) struct Element {
+    pub(super) name: String,
+    /// Rows, and those that the header claims.
+    pub(super) count: usize,
+    pub(super) claimed: usize,
+    /// Names and sizes of the columns [bytes].
+    pub(super) columns: Vec<(String, Kind)>,
+    /// Where it begins among the rows [bytes].
+    pub(super) begin: usize,
+}
+
+/// Where a number stands in a row, and what it is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Column {
+    at: usize,
+    pub(super) kind: Kind,
+}
+
+/// What a number is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Byte,
+    Short,
+    Word,
+    Float,
+    Double,
+}
+
+impl Kind {
+    pub(super) fn parse(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "uchar" | "int8" | "uint8" => Self::Byte,
+            "short" | "ushort" | "int16" | "uint16" => Self::Short,
+            "int" | "uint" | "int32" | "uint32" => Self::Word,
+            "float" | "float32" => Self::Float,
+            "double" | "float64" => Self::Double,
+            _ => return None,
+        })
+    }
+
+    pub(super) fn bytes(self) -> usize {
+        match self {
+            Self::Byte => 1,
+            Self::Short => 2,
+            Self::Word | Self::Float => 4,
+            Self::Double => 8,
+        }
+    }
+}
 
 /// How a file writes its numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,6 +79,60 @@ impl Format {
             Self::Ascii => (2 * element.kinds().count()).saturating_sub(1),
         }
     }
+}
+
+impl Element {
+    pub(super) fn stride(&self) -> usize {
+        self.kinds().map(Kind::bytes).sum()
+    }
+
+    /// What its columns hold.
+    pub(super) fn kinds(&self) -> impl Iterator<Item = Kind> {
+        self.columns.iter().map(|(_, kind)| *kind)
+    }
+
+    /// Where a column of this type begins within a row [bytes].
+    pub(super) fn column(&self, wanted: &str, kind: Kind) -> Option<usize> {
+        self.find(wanted).filter(|column| column.kind == kind).map(|column| column.at)
+    }
+
+    /// A column, whatever its type.
+    pub(super) fn find(&self, wanted: &str) -> Option<Column> {
+        let mut at = 0;
+        for (name, kind) in &self.columns {
+            if name == wanted {
+                return Some(Column { at, kind: *kind });
+            }
+            at += kind.bytes();
+        }
+        None
+    }
+
+    pub(super) fn has(&self, wanted: &str) -> bool {
+        self.columns.iter().any(|(name, _)| name == wanted)
+    }
+}
+
+impl Column {
+    pub(super) fn value(self, row: &[u8]) -> f32 {
+        match self.kind {
+            Kind::Double => {
+                let bytes = row.get(self.at..self.at + 8).and_then(|b| b.try_into().ok());
+                bytes.map_or(f32::NAN, |bytes| f64::from_le_bytes(bytes) as f32)
+            }
+            _ => float(row, self.at),
+        }
+    }
+}
+
+/// Four bytes of a row as a number.
+pub(super) fn float(row: &[u8], at: usize) -> f32 {
+    f32::from_bits(word(row, at))
+}
+
+/// Four bytes of a row as an unsigned number.
+pub(super) fn word(row: &[u8], at: usize) -> u32 {
+    row.get(at..at + 4).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes)
 }
 
 /// Big-endian rows as little-endian ones.
