@@ -37,6 +37,9 @@ pub struct Lag {
     pub open: bool,
     /// Lags far apart fit alike, as a motion that repeats itself leaves it.
     pub repeats: bool,
+    /// Half the interval around that lag alone [s].
+    #[serde(skip)]
+    pub half_width: f64,
 }
 
 /// Joints that lag alike.
@@ -396,6 +399,7 @@ impl<'a> Curve<'a> {
             correlation: self.sums(chosen.lag).correlation(),
             open,
             repeats,
+            half_width: half * step,
         })
     }
 }

@@ -124,7 +124,8 @@ fn meant(lag: &Lag) -> f64 {
 /// A lag that shrinks as the motion gets faster.
 fn with_speed(measured: &Track, desired: &Track, step: f64) -> Option<String> {
     let ((slow_hz, slow), (fast_hz, fast)) = by_speed(measured, desired)?;
-    (slow.seconds > 2.0 * step && slow.seconds / fast.seconds.max(step) > FASTER && slow.interval[0] > fast.interval[1])
+    let apart = slow.seconds - slow.half_width > fast.seconds + fast.half_width;
+    (slow.seconds > 2.0 * step && slow.seconds / fast.seconds.max(step) > FASTER && apart)
         .then(|| {
             format!(
                 ". It shrinks from {:.0} ms at {slow_hz:.1} Hz to {:.0} ms at {fast_hz:.1} Hz: a constant phase, as friction or a \
@@ -146,7 +147,8 @@ fn by_speed(measured: &Track, desired: &Track) -> Option<((f64, Lag), (f64, Lag)
         let start = desired.t.partition_point(|t| *t < from);
         let told = desired.rows(start..desired.t.partition_point(|t| *t <= to).max(start));
         let lag = lag::between(Motion { t: &told.t, q: &told.q }, Motion { t: &did.t, q: &did.q })?;
-        (!lag.open && lag.correlation > CLEAR).then_some((hz, lag))
+        // One speed over and over: of the lags that fit, the one nearest to none.
+        ((lag.repeats || !lag.open) && lag.correlation > CLEAR).then_some((hz, lag))
     };
     let mut found: Vec<(f64, Lag)> = (0..PARTS).filter(|_| length > 50).filter_map(part).collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -236,7 +238,14 @@ mod tests {
 
     #[test]
     fn an_interval_of_many_rows_either_way_is_no_lag() {
-        let lag = Lag { seconds: 0.01, interval: [-0.067, 0.032], correlation: 0.99, open: false, repeats: false };
+        let lag = Lag {
+            seconds: 0.01,
+            interval: [-0.067, 0.032],
+            correlation: 0.99,
+            open: false,
+            repeats: false,
+            half_width: 0.05,
+        };
         let said = untold(&lag, 1e-3).expect("a reason");
         assert!(said.contains("whether the arm leads") && said.contains("-67 to 32 ms"), "{said}");
         assert_eq!(untold(&Lag { interval: [-0.002, 0.022], ..lag }, 1e-3), None);

@@ -221,7 +221,9 @@ mod tests {
         let q = vec![wave(0.7), wave(1.3)];
         let rows: Vec<Vec<f64>> = (0..t.len()).map(|row| change(&[q[0][row], q[1][row]], &model())).collect();
         // Dry friction.
-        let friction = |joint: usize, row: usize| dry * [0.7, 1.3].map(|w| (w * t[row]).cos()).map(|c| c.signum() + 0.1 * c)[joint];
+        let friction = |joint: usize, row: usize| {
+            dry * [0.7, 1.3].map(|w| (w * t[row]).cos()).map(|c| c.signum() + 0.1 * c)[joint]
+        };
         let tau = |joint: usize| (0..t.len()).map(|row| rows[row][joint] + friction(joint, row)).collect();
         let track = Track { tau: vec![tau(0), tau(1)], q, t, ..Track::default() };
         let (mut columns, mut notes) = (JointColumns::default(), Notes::default());
