@@ -90,7 +90,7 @@ fn torques(falls: [f64; 3], factors: Row) -> impl Fn(f64) -> (Row, Row, Option<R
         let [q, dq] = waves(t);
         let weight = arm.holding(&joints_from(&q), falls);
         let tau = std::array::from_fn(|j| factors[j] * (weight[j] + 0.3 * (dq[j] / 0.01).tanh()) + 0.02 * noise(t, j));
-        (waves(t + 0.03)[0], q, Some(tau))
+        (waves(t + 0.0304)[0], q, Some(tau))
     }
 }
 
@@ -155,13 +155,13 @@ fn a_turned_torque_and_a_missing_constant_are_named() {
 fn efforts_of_zeros_are_no_torques_and_said_once() {
     let lab = lab();
     for value in [0.0, f64::NAN, 1.25] {
-        log(lab.path(), (6.0, 100.0), |t| (waves(t + 0.03)[0], waves(t)[0], Some([value; JOINTS])));
+        log(lab.path(), (6.0, 100.0), |t| (waves(t + 0.0304)[0], waves(t)[0], Some([value; JOINTS])));
         let (said, mapping, checked) = imported(lab.path(), &[]);
         assert_eq!(said.matches("no torques").count(), 1, "{said}");
         assert!(mapping.contains("tau = []") && !said.contains("gravity"), "{said}");
         assert!(faults(&checked).is_empty(), "{checked}");
     }
-    log(lab.path(), (6.0, 100.0), |t| (waves(t + 0.03)[0], waves(t)[0], Some([0.0; JOINTS])));
+    log(lab.path(), (6.0, 100.0), |t| (waves(t + 0.0304)[0], waves(t)[0], Some([0.0; JOINTS])));
     let (_, mapping, _) = imported(lab.path(), &[]);
     // Whoever says that gravity was taken off does not make torques of them.
     let (before, after) = mapping.split_once("tau = []").expect("the measured block");

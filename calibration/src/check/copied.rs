@@ -3,7 +3,7 @@
 
 use super::columns::{Columns, Signals};
 use super::limits::{COPIED, COPIED_ROUNDED, COPIED_WITHIN, FEWEST_ROWS};
-use super::remark::{Fault, Remark, Size};
+use super::remark::{Fault, Remark, Severity, Size};
 
 /// The remark on a clip.
 pub(super) fn remark(clip: &Columns) -> Option<Remark> {
@@ -57,8 +57,11 @@ pub(super) fn remark(clip: &Columns) -> Option<Remark> {
             ),
         };
         let what = format!("{what}, and they say nothing about how the arm follows");
+        // An arm without error and with a delay alone is what a simulated one may be.
+        let severity = if later < 0 { Severity::Note } else { Severity::Wrong };
         Remark::new(Fault::CopiedCommands, &clip.file, "desired q", what)
             .sized(Size::count(share, "share of rows"))
+            .weighed(severity)
             .mended_by("log what the controller was asked for; without it `calibration diagnose --torques` explains logged torques")
     })
 }
@@ -118,6 +121,9 @@ mod tests {
     #[test]
     fn copies_are_found_whatever_row_they_are_of_and_commands_are_none() {
         let of = |command: &dyn Fn(&[f64], usize) -> f64| remark(&clip(command)).map(|remark| remark.what);
+        let severity = |command: &dyn Fn(&[f64], usize) -> f64| remark(&clip(command)).map(|remark| remark.severity);
+        assert_eq!(severity(&|q, i| q[i]), Some(Severity::Wrong));
+        assert_eq!(severity(&|q, i| q[(i + 1).min(399)]), Some(Severity::Note));
         assert!(of(&|q, i| q[i]).expect("a copy").contains("are the measured positions to the bit"));
         let later = of(&|q, i| q[(i + 1).min(399)]).expect("the next row");
         assert!(later.contains("equal to the bit to the commands 1 row before"), "{later}");

@@ -171,12 +171,19 @@ mod tests {
     }
 
     /// Two joints that do the same, a row a millisecond.
+    /// The first remark on two joints that are the same.
     fn remark_on(q: impl Fn(usize) -> f64) -> Option<Remark> {
+        remark_on_joints(|_, row| q(row))
+    }
+
+    /// The same of the position of each joint in each row.
+    fn remark_on_joints(q: impl Fn(usize, usize) -> f64) -> Option<Remark> {
         let rows = 0..5000;
-        let column: Vec<f64> = rows.clone().map(q).collect();
+        let column = |joint: usize| -> Vec<f64> { rows.clone().map(|row| q(joint, row)).collect() };
+        let columns = vec![column(0), column(1)];
         let measured = Signals {
             t: rows.map(|i| i as f64 * 1e-3).collect(),
-            q: vec![column.clone(), column],
+            q: columns,
             noise: vec![0.0; 2],
             ..Signals::default()
         };
@@ -231,7 +238,11 @@ mod tests {
             }
             let found = remark_on(|i| smooth(i) + 1.4e-3 * spread[i]);
             assert!(found.is_none(), "noise: {found:?}");
-            let found = remark_on(|i| smooth(i) + 1.4e-3 * spread[i] * if wide[i] < 0.01 { 8.0 } else { 1.0 });
+            let found = remark_on_joints(|joint, row| {
+                // Each joint has noise of its own.
+                let at = (row + 2500 * joint) % 5000;
+                smooth(row) + 1.4e-3 * spread[at] * if wide[at] < 0.01 { 8.0 } else { 1.0 }
+            });
             assert!(
                 found.as_ref().is_none_or(|found| found.severity == Severity::Note),
                 "noise with far values: {found:?}"
