@@ -136,7 +136,8 @@ impl Weight {
             return odd;
         }
         let aligned = cosine.abs() > ANOTHER_WAY.cos();
-        if sure && aligned && (self.is_turned(cosine) || !ALL.contains(&size) && self.is_the_models(share)) {
+        let is_scaled = !(SCALED.recip()..SCALED).contains(&size);
+        if sure && aligned && (self.is_turned(cosine) || is_scaled && self.is_the_models(share)) {
             return Finding::Scaled(None, share);
         }
         // The other way round of the model's own size: a base that hangs.

@@ -113,7 +113,7 @@ fn joint_and_rest(text: &str) -> (String, String) {
     let (mut joint, mut rest) = (String::new(), String::new());
     for part in text.split_inclusive(['.', '/']) {
         let own = part.trim_end_matches(['.', '/']);
-        if is_signal(own) {
+        if own.is_empty() || is_signal(own) {
             rest += part;
             continue;
         }

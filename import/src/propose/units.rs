@@ -128,7 +128,8 @@ pub(super) fn desired(
         desired.q_unit = AngleUnit::NotKnown;
         return;
     }
-    if unit != measured.q_unit && (unit == AngleUnit::NotKnown || (is_one && named(&measured.q).is_some())) {
+    let untold = unit == AngleUnit::NotKnown && (is_one || factor.is_none());
+    if unit != measured.q_unit && (untold || (is_one && named(&measured.q).is_some())) {
         desired.q_unit = measured.q_unit;
         notes.why(line, "they go where the measured positions go: one unit for both");
         return;

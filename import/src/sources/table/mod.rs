@@ -350,7 +350,7 @@ mod tests {
         let rows = |odd: &'static str| {
             (0..100).map(move |k| if k == 50 { format!("{odd}\n") } else { format!("{k},{k}.5\n") })
         };
-        for (odd, words) in [("50", "line 52 has 1 columns, the others have 2: 1 of 100"), ("50,x", "row 51 holds `x`")]
+        for (odd, words) in [("50", "line 52 has 1 columns, the others have 2: 1 of 101"), ("50,x", "row 51 holds `x`")]
         {
             let found = parse(&("t,q\n".to_owned() + &rows(odd).collect::<String>())).expect("a table");
             assert!(found.warnings.len() == 1 && found.warnings[0].contains(words), "{:?}", found.warnings);
