@@ -190,7 +190,7 @@ fn holds(name: &str, answer: impl FnOnce() -> Value) {
     };
     let before = cpu();
     let is = kept(&answer());
-    println!("{name}: {} {}, {:.0} CPU s", is["verdict"]["kind"], is["verdict"], cpu() - before);
+    eprintln!("{name}: {} {}, {:.0} CPU s", is["verdict"]["kind"], is["verdict"], cpu() - before);
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("verdicts");
     std::fs::create_dir_all(&folder).expect("a folder");
     let text = serde_json::to_string_pretty(&json!({ name: is })).expect("numbers") + "\n";

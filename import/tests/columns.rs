@@ -321,7 +321,7 @@ fn gains_sines_and_motions_in_a_row_are_no_positions_and_the_later_of_two_is_wha
     let lag = 0.04;
     // Abbreviations that no list of words has.
     let mut columns = time();
-    columns.extend(seven("JntPosGrbl", |j, t| q(j, t)));
+    columns.extend(seven("JntPosGrbl", q));
     columns.extend(seven("JntPosWxyv", move |j, t| q(j, t - lag)));
     columns.extend(seven("JntRigid", |j, _| 600.0 - j as f64));
     let lab = Lab::of("axes.csv", table(&columns, 300, DT));
@@ -333,7 +333,7 @@ fn gains_sines_and_motions_in_a_row_are_no_positions_and_the_later_of_two_is_wha
     assert!(told.contains("`JntPosWxyv`") && told.contains("`JntRigid` of `rows`: the same in every row"), "{told}");
     // Neither leads: it is asked, and both are named.
     let mut columns = time();
-    columns.extend(seven("JntPosGrbl", |j, t| q(j, t)));
+    columns.extend(seven("JntPosGrbl", q));
     columns.extend(seven("JntPosWxyv", |j, t| q(j, t) + 0.01 * (7.0 * t).sin()));
     let lab = Lab::of("axes.csv", table(&columns, 300, DT));
     let (open, notes) = lab.asked(None);
@@ -342,7 +342,7 @@ fn gains_sines_and_motions_in_a_row_are_no_positions_and_the_later_of_two_is_wha
     assert!(told.contains("`JntPosGrbl`") && told.contains("`JntPosWxyv`"), "{told}");
     // Names say what is a position, and numbers that another column is the integral of the velocities.
     let mut columns = time();
-    columns.extend(seven("pos_a", |j, t| q(j, t)));
+    columns.extend(seven("pos_a", q));
     columns.extend(seven("pos_b", |j, t| (3.0 * q(6 - j, t)).cos()));
     columns.extend(seven("vel", |j, t| 57.3 * dq(j, t)));
     let lab = Lab::of("one.csv", table(&columns, 300, DT));

@@ -2,6 +2,7 @@
 //! And bringing one up to date that a person wrote: with comments and all that the update says nothing about.
 
 use crate::input::{self, InputError};
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike};
@@ -41,6 +42,37 @@ pub fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, TomlFile
         let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
         TomlFileError::Content { path: path.to_owned(), line, what: with_nearest_name(error.message()) }
     })
+}
+
+/// Refuses a list of which a part was passed over: of one that has a length of its own, as a place in the plane, nothing is read
+/// behind its end. `read` is what was made of `text`; zeros at the end are no loss.
+///
+/// # Errors
+/// [`TomlFileError::Content`] with the key.
+pub fn refuse_longer_lists<T: Serialize>(text: &str, read: &T, path: &Path) -> Result<(), TomlFileError> {
+    let (Ok(given), Ok(kept)) = (text.parse::<toml::Table>(), toml::Table::try_from(read)) else { return Ok(()) };
+    match longer(&toml::Value::Table(given), &toml::Value::Table(kept), String::new()) {
+        Some(what) => Err(TomlFileError::Content { path: path.to_owned(), line: None, what }),
+        None => Ok(()),
+    }
+}
+
+fn longer(given: &toml::Value, kept: &toml::Value, key: String) -> Option<String> {
+    use toml::Value::{Array, Float, Integer, Table};
+    match (given, kept) {
+        (Table(given), Table(kept)) => given.iter().find_map(|(name, value)| {
+            let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+            longer(value, kept.get(name)?, key)
+        }),
+        (Array(given), Array(kept)) => {
+            let is_zero = |value: &toml::Value| matches!(value, Integer(0)) || matches!(value, Float(v) if *v == 0.0);
+            if given.iter().skip(kept.len()).any(|value| !is_zero(value)) {
+                return Some(format!("`{key}` has {} values, and {} belong there", given.len(), kept.len()));
+            }
+            given.iter().zip(kept).find_map(|(given, kept)| longer(given, kept, key.clone()))
+        }
+        _ => None,
+    }
 }
 
 /// The text `before` with the values of `update`; everything else of it stays, blocks of other names too, but for the arrays of
@@ -212,7 +244,10 @@ mod tests {
     #[test]
     fn no_word_of_a_library_is_left_in_what_is_wrong_with_a_value() {
         for (text, said) in [
-            ("[simulation]\nobject_position = [0.1, 0.2, 0.3]\n", "3 values stand there; expected"),
+            (
+                "[simulation]\nobject_position = [0.1, 0.2, 0.3]\n",
+                "`simulation.object_position` has 3 values, and 2 belong there",
+            ),
             ("[table]\nheight = \"low\"\n", "\"low\" stands there; expected a number"),
             ("[tool]\nmass = 0.2\nlength = 0.1\n", "the key `radius` is missing"),
             ("[controller]\nkind = \"pd\"\n", "`pd` is none of the known words; expected `joint_impedance`"),

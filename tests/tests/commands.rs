@@ -15,12 +15,14 @@ use twin::control::Drive;
 use twin::sim::SimCell;
 
 /// Flags that programs give each other, or that belong to programs of others.
-const OF_OTHERS: [&str; 10] = [
+const OF_OTHERS: [&str; 11] = [
     "parent",
     "configuration",
     "shm-size",
     "features",
     "release",
+    // Of ros2 topic echo.
+    "csv",
     // Of Slurm.
     "job-name",
     "array",

@@ -3,7 +3,7 @@
 //!
 //! Inverse dynamics of the links: `tau_J = M(q) ddq + c(q, dq) + g(q)`, M without the rotors, which lie before the sensor.
 
-use super::columns::{Columns, Signals, between};
+use super::columns::{Columns, between};
 use super::limits::{
     ACCELERATION, CARRIES_GRAVITY, LEAST_GRAVITY, NOT_ITS_SLOPE, TORQUE_BETTER, TORQUE_EXPLAINED, TORQUE_LEFT,
     TORQUE_ROWS,

@@ -38,8 +38,7 @@ pub struct Options {
     pub masks: Vec<PathBuf>,
     /// A picture without the robot.
     pub background: Option<PathBuf>,
-    /// Which pictures of a session; unless given depth where there is some, which tells the robot from what lies behind it,
-    /// whatever light falls on both.
+    /// Which pictures of a session; unless given depth where there is some, which no light changes.
     pub kind: Option<PictureKind>,
     /// fx, fy, cx, cy.
     pub intrinsics: Option<[f64; 4]>,

@@ -200,7 +200,8 @@ pub(crate) fn are_pose(labels: &[String]) -> bool {
             parts.iter().filter(|(_, last)| last == word).map(|(before, _)| before).collect()
         };
         let all = words.map(of);
-        all[0].iter().any(|before| all.iter().all(|there| there.contains(before)) && !(alone && !before.is_empty()))
+        let stands = |before: &&String| all.iter().all(|there| there.contains(before)) && (before.is_empty() || !alone);
+        all[0].iter().any(|before| stands(&before))
     };
     together(["x", "y", "z"], false)
         || together(["rx", "ry", "rz"], false)

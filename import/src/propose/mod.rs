@@ -266,7 +266,7 @@ fn block(
         },
         None => {
             let first = || log.tables.first().map_or("", |table| table.name.as_str());
-            JointColumns { table: asked.map_or_else(first, |asked| asked).to_owned(), ..JointColumns::default() }
+            JointColumns { table: asked.unwrap_or_else(first).to_owned(), ..JointColumns::default() }
         }
     };
     if let Some(table) = log.table(&columns.table) {

@@ -147,7 +147,9 @@ impl Cell {
         if let Some(what) = blocks::both_forms::<Object>(text) {
             return Err(CellError::Value { path: path.to_owned(), what });
         }
-        toml_file::parse::<Self>(text, path)?.settle(path)
+        let read = toml_file::parse::<Self>(text, path)?;
+        toml_file::refuse_longer_lists(text, &read, path)?;
+        read.settle(path)
     }
 
     fn settle(mut self, path: &Path) -> Result<Self, CellError> {

@@ -201,7 +201,7 @@ mod tests {
         let (chinese, russian) = (&b"a,b\n\xb9\xd8\xbd\xda,1\n"[..], &b"\xc2\xf0\xe5\xec\xff,q\n"[..]);
         assert_eq!(decode(chinese.to_vec()), Err(NoText::Encoding(2)), "GBK");
         assert_eq!(decode(russian.to_vec()), Err(NoText::Encoding(1)), "Windows-1251");
-        let mixed = [&"°\n"[..].as_bytes(), &b"\xb0\n"[..]].concat();
+        let mixed = ["°\n".as_bytes(), b"\xb0\n"].concat();
         assert_eq!(decode(mixed), Err(NoText::Mixed(2)));
         assert_eq!(decode(vec![1, 2, 0xff, 0]), Err(NoText::Binary));
         assert_eq!(decode(b"\x28\xb5\x2f\xfd1234".to_vec()), Err(NoText::Packed(Packing::Zstd)));

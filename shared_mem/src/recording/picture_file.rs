@@ -56,7 +56,9 @@ pub fn unpack_picture(bytes: &[u8], stamp_ns: u64) -> Result<Picture, String> {
 }
 
 /// A JPEG of which the header is read, and its columns and rows.
-fn opened_jpeg(bytes: &[u8]) -> Result<(JpegDecoder<ZCursor<&[u8]>>, [u32; 2]), String> {
+type OpenedJpeg<'a> = (JpegDecoder<ZCursor<&'a [u8]>>, [u32; 2]);
+
+fn opened_jpeg(bytes: &[u8]) -> Result<OpenedJpeg<'_>, String> {
     let options = DecoderOptions::default()
         .jpeg_set_out_colorspace(ColorSpace::RGB)
         .set_max_width(LONGEST)

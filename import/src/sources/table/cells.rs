@@ -296,7 +296,7 @@ fn delimiter(lines: &[&str]) -> u8 {
             && words.peek().is_some_and(|word| word.contains(','))
             && words.all(|word| Decimal::Comma.number(word).is_some())
     };
-    if best == b',' && lines.len() > 1 && lines.iter().skip(1).all(|line| is_blank(line)) { b' ' } else { best }
+    if best == b',' && lines.len() > 1 && lines.iter().skip(1).all(is_blank) { b' ' } else { best }
 }
 
 /// How often a sign stands in a line, outside of brackets and quotation marks.

@@ -337,11 +337,11 @@ mod tests {
         assert_eq!(values("0,000 0,1\n0,010 0,2\n"), [vec![0.0, 0.01], vec![0.1, 0.2]], "blanks");
         // Another column says that commas are decimal signs.
         assert_eq!(values("t;q\n0,5;1,234\n1,0;2,345\n"), [vec![0.5, 1.0], vec![1.234, 2.345]]);
-        let what = parse("t;q\n1;1,234\n2;2,345\n").err().expect("it may be either");
+        let what = parse("t;q\n1;1,234\n2;2,345\n").expect_err("it may be either");
         assert!(what.contains("`1,234` in the column `q`"), "{what}");
         assert!(values("t;q\n0,5;NA\n1,0;2\n")[1][0].is_nan());
         // Commas between columns and in numbers.
-        let what = parse("t,q\n0,5,1,5\n1,5,2,5\n2,5,3,5\n").err().expect("no columns");
+        let what = parse("t,q\n0,5,1,5\n1,5,2,5\n2,5,3,5\n").expect_err("no columns");
         assert!(what.contains("part the columns with `;`"), "{what}");
     }
 
@@ -366,17 +366,17 @@ mod tests {
     fn more_columns_than_any_log_has_are_refused_and_as_many_are_read() {
         let of = |count: usize| format!("{}\n{}\n", "c,".repeat(count - 1) + "c", "1,".repeat(count - 1) + "1");
         assert_eq!(parse(&of(MOST_COLUMNS)).expect("a table").columns.len(), MOST_COLUMNS);
-        let what = parse(&of(MOST_COLUMNS + 1)).err().expect("too many");
+        let what = parse(&of(MOST_COLUMNS + 1)).expect_err("too many");
         assert!(what.contains("100001 columns"), "{what}");
         let list = format!("t,q\n0,\"[{}]\"\n", "1,".repeat(MOST_COLUMNS + 1));
-        let what = parse(&list).err().expect("too many");
+        let what = parse(&list).expect_err("too many");
         assert!(what.contains("lists of 100001 numbers in the column `q`"), "{what}");
     }
 
     #[test]
     fn what_a_table_becomes_is_drawn_before_it_is_there() {
         let text = "t,word\n0,a\n1,b\n2,c\n";
-        let spent = super::parse(text, &Budget::with(200, 1000)).err().expect("too little");
+        let spent = super::parse(text, &Budget::with(200, 1000)).expect_err("too little");
         assert!(matches!(spent, Refused::Budget(BudgetError::Memory(200))), "{spent:?}");
         super::parse(text, &Budget::with(2000, 1000)).expect("a table");
     }
