@@ -201,7 +201,7 @@ pub(crate) fn are_pose(labels: &[String]) -> bool {
         };
         let all = words.map(of);
         let stands = |before: &&String| all.iter().all(|there| there.contains(before)) && (before.is_empty() || !alone);
-        all[0].iter().any(|before| stands(&before))
+        all[0].iter().any(stands)
     };
     together(["x", "y", "z"], false)
         || together(["rx", "ry", "rz"], false)

@@ -43,7 +43,7 @@ pub(super) fn on_circle(some: &[&[f64]], others: &[&[f64]]) -> bool {
 /// Whether one group holds sines and cosines of the same angles: in turn, or first the ones and then the others.
 pub(super) fn are_sines(columns: &[&[f64]]) -> bool {
     let half = columns.len() / 2;
-    if columns.len() % 2 != 0 || half == 0 {
+    if !columns.len().is_multiple_of(2) || half == 0 {
         return false;
     }
     let (first, second) = columns.split_at(half);
