@@ -84,6 +84,9 @@ const SCALED: f64 = 2.0;
 const MOSTLY: f64 = 0.5;
 /// What is significant, in sigmas.
 const SIGNIFICANT: f64 = 4.0;
+/// A joint tells its own factor where it feels so much of what the joint does that feels most [1]; a choice: of less, the load in a
+/// hand and a push make several times as much.
+const FELT: f64 = 0.05;
 /// Shares of a joint's information that are below this are of the arithmetic [1].
 const ROUNDING: f64 = 1e-9;
 /// Weight and motion of one unit agree to this factor [1]; a choice, since rotors count as motion.
@@ -213,6 +216,13 @@ impl Weight {
         by_factor < by_pull
     }
 
+    /// How much of the weight a joint feels as the arm moves, beside its own friction and motion [N m, but for one factor of all
+    /// joints].
+    fn felt(&self, joint: usize, pull: [f64; 3]) -> f64 {
+        let of = |witness: &Witness| dot(pull, product(&witness.of_pull().0, pull)).max(0.0) / witness.weight;
+        self.joints.get(joint).map_or(0.0, of).sqrt()
+    }
+
     /// How many times the torque of a pull one joint's is, with half its 95 % interval; `None` where its weight does not tell.
     fn factor(&self, joint: usize, pull: [f64; 3]) -> Option<[f64; 2]> {
         let witness = self.joints.get(joint)?;
@@ -222,7 +232,8 @@ impl Weight {
         let half = NORMAL_95 / known.sqrt();
         // An axis along the pull holds none of it, but for rounding.
         let all: f64 = (0..3).map(|k| information[k][k]).sum();
-        let holds = known > ROUNDING * all * dot(pull, pull);
+        let most = (0..self.joints.len()).map(|joint| self.felt(joint, pull)).fold(0.0, f64::max);
+        let holds = known > ROUNDING * all * dot(pull, pull) && self.felt(joint, pull) > FELT * most;
         (holds && factor.is_finite() && witness.moments > INDEPENDENT && half < SURE * factor.abs())
             .then_some([factor, half])
     }

@@ -8,7 +8,7 @@ use super::limits::{
     ACCELERATION, CARRIES_GRAVITY, LEAST_GRAVITY, NOT_ITS_SLOPE, TORQUE_BETTER, TORQUE_EXPLAINED, TORQUE_LEFT,
     TORQUE_ROWS,
 };
-use super::remark::{Fault, Remark, Size};
+use super::remark::{Fault, Remark, Severity, Size};
 use super::statistics::mean;
 use import::weight::{self, Finding, Weight};
 use shared_mem::msg::{Joints, MAX_JOINTS};
@@ -238,7 +238,8 @@ fn of_joint(clip: &Columns, joint: usize, factor: f64, meaning: &str) -> Remark 
     let what = format!(
         "the measured torque of {who} is {factor:.2} times what holds it by the weight that the other joints show: {meaning}"
     );
-    torque_unit(clip, format!("measured effort, {who}"), what, Size::count(factor, "1"))
+    // A load that the model lacks, or a push, makes much of the little weight that a wrist's joint feels.
+    torque_unit(clip, format!("measured effort, {who}"), what, Size::count(factor, "1")).weighed(Severity::Warning)
 }
 
 fn torque_unit(clip: &Columns, channel: String, what: String, size: Size) -> Remark {

@@ -35,6 +35,8 @@ pub(super) struct Witness {
     wants: [f64; COMMON],
     /// Moments that count, as many as independent ones.
     pub(super) moments: f64,
+    /// What each weighs: 1 over the variance of its torque [1/(N m)^2].
+    pub(super) weight: f64,
 }
 
 impl Witness {
@@ -115,6 +117,7 @@ impl Columns {
             information: std::array::from_fn(|i| std::array::from_fn(|k| left(i, k))),
             wants: std::array::from_fn(|i| left(i, COMMON)),
             moments: self.tau.len() as f64,
+            weight,
         };
         Some((witness, own))
     }
