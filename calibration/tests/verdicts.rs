@@ -2,8 +2,8 @@
 //! intervals and shrink. A change of code that is none of arithmetic leaves them as they are.
 //!
 //! `cargo test --release --workspace --test verdicts -- --include-ignored --nocapture --test-threads 1` looks at all twelve and prints what
-//! each cost (13 minutes of one core); the three quickest are always looked at. What is found is written to `target/tmp/verdicts/`, one file a world: where a change is
-//! meant, its object replaces the one of that name in `verdicts.json`.
+//! each cost (13 minutes of one core); the three quickest are always looked at. What is found is written to `target/tmp/verdicts/`, one
+//! file a world: where a change is meant, its object replaces the one of that name in `verdicts.json`.
 
 mod driven;
 mod slides;
@@ -207,31 +207,31 @@ fn an_arm_in_which_nothing_is_wrong() {
 }
 
 #[test]
-#[ignore = "slow; all twelve by the command above"]
+#[ignore = "takes 7 to 180 CPU s; all twelve by the command at the head of this file"]
 fn a_servo_with_dry_friction() {
     holds("servo", servo);
 }
 
 #[test]
-#[ignore = "slow; all twelve by the command above"]
+#[ignore = "takes 7 to 180 CPU s; all twelve by the command at the head of this file"]
 fn an_object_alone_on_a_table_that_leans() {
     holds("slides_tilt", slid);
 }
 
 #[test]
-#[ignore = "slow; all twelve by the command above"]
+#[ignore = "takes 7 to 180 CPU s; all twelve by the command at the head of this file"]
 fn an_arm_with_dry_friction() {
     holds("arm_friction", || drawn(102, Kind::Excitation, of_effect(Kind::Excitation, "joint_coulomb_friction")));
 }
 
 #[test]
-#[ignore = "slow; all twelve by the command above"]
+#[ignore = "takes 7 to 180 CPU s; all twelve by the command at the head of this file"]
 fn an_arm_with_two_effects() {
     holds("arm_two", || drawn(103, Kind::Excitation, Fault::Pair));
 }
 
 #[test]
-#[ignore = "slow; all twelve by the command above"]
+#[ignore = "takes 7 to 180 CPU s; all twelve by the command at the head of this file"]
 fn an_arm_with_what_no_effect_describes() {
     holds("arm_hose", || drawn(104, Kind::Excitation, Fault::Outside(Outside::Hose)));
 }
@@ -247,25 +247,25 @@ fn torques_of_an_arm_with_a_load() {
 }
 
 #[test]
-#[ignore = "slow; all twelve by the command above"]
+#[ignore = "takes 7 to 180 CPU s; all twelve by the command at the head of this file"]
 fn two_sessions_between_which_a_load_came() {
     holds("against_load", compared);
 }
 
 #[test]
-#[ignore = "slow; all twelve by the command above"]
+#[ignore = "takes 7 to 180 CPU s; all twelve by the command at the head of this file"]
 fn strokes_in_which_nothing_is_wrong() {
     holds("strokes_nothing", || drawn(105, Kind::Strokes, Fault::Nothing));
 }
 
 #[test]
-#[ignore = "slow; all twelve by the command above"]
+#[ignore = "takes 7 to 180 CPU s; all twelve by the command at the head of this file"]
 fn strokes_on_a_table_that_leans() {
     holds("strokes_tilt", || drawn(106, Kind::Strokes, of_effect(Kind::Strokes, "table_tilt")));
 }
 
 #[test]
-#[ignore = "slow; all twelve by the command above"]
+#[ignore = "takes 7 to 180 CPU s; all twelve by the command at the head of this file"]
 fn strokes_seen_late() {
     holds("strokes_camera_late", || drawn(107, Kind::Strokes, of_effect(Kind::Strokes, "camera_latency")));
 }

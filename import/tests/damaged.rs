@@ -88,7 +88,8 @@ fn a_damaged_log_is_refused_in_one_line_or_read_with_a_warning() {
 
 /// `cargo test --release -p import --test damaged -- --ignored --nocapture`
 #[test]
-#[ignore = "takes a minute; prints how many of 200 damaged copies of each log were refused or read with a warning"]
+#[ignore = "takes a minute: cargo test --release --workspace --test damaged -- --ignored --nocapture prints how many of 200 damaged \
+            copies of each log were refused or read with a warning"]
 fn two_hundred_of_each() {
     for (log, file) in LOGS {
         let [cut, changed] = damaged(log, file, 200);
