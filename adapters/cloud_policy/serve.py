@@ -1,8 +1,8 @@
 """Serves a policy that train.py has trained, by openpi's websocket protocol:
 
     python adapters/cloud_policy/serve.py laptop_policy --port 8000
-    calibration policy run --task tasks/close_laptop.toml --policy ws://localhost:8000 --chunk 16
-    calibration evaluate --policies cloud=ws://localhost:8000 --tasks tasks/close_laptop.toml --chunk 16 --out cloud
+    calibration policy run --task twin/tasks/close_laptop.toml --policy ws://localhost:8000 --chunk 16
+    calibration evaluate --policies cloud=ws://localhost:8000 --tasks twin/tasks/close_laptop.toml --chunk 16 --out cloud
 
 It needs `observation/state` and `observation/depth/CAMERA` (or `observation/image/CAMERA`) and answers with `actions`, a chunk of them.
 """

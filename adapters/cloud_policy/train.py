@@ -1,8 +1,8 @@
 """A diffusion policy on partial clouds (or on pictures), trained on demonstrations:
 
-    twin task tasks/close_laptop.toml --episodes 50 --noise 0.003 --record laptop
-    calibration export-episodes tasks/close_laptop.toml laptop --to lerobot --out laptop_lerobot
-    python adapters/cloud_policy/train.py laptop_lerobot --task tasks/close_laptop.toml --out laptop_policy
+    twin task twin/tasks/close_laptop.toml --episodes 50 --noise 0.003 --record laptop
+    calibration export-episodes twin/tasks/close_laptop.toml laptop --to lerobot --out laptop_lerobot
+    python adapters/cloud_policy/train.py laptop_lerobot --task twin/tasks/close_laptop.toml --out laptop_policy
 
 writes OUT/checkpoint.pt, every minute and at the end; the same command goes on after Ctrl-C, as if there had been none.
 """

@@ -83,7 +83,7 @@ fn a_policy_in_a_file_says_what_it_lacks_to_be_computed() {
     let file = folder.path().join("policy.onnx");
     let run = || {
         let policy = file.display().to_string();
-        let arguments = ["policy", "run", "--task", "../tasks/push_milk.toml", "--policy", &policy];
+        let arguments = ["policy", "run", "--task", "../twin/tasks/push_milk.toml", "--policy", &policy];
         let mut command = Command::new(env!("CARGO_BIN_EXE_calibration"));
         let output = command.args(arguments).env("ORT_DYLIB_PATH", "/nowhere.so").output().expect("it runs");
         assert_eq!(output.status.code(), Some(1));

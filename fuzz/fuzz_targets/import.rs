@@ -24,7 +24,7 @@ const LOGS: [(&str, Option<&str>); 11] = [
 ];
 
 fn fixture(log: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../import/tests/fixtures").join(log)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared_mem/import/tests/fixtures").join(log)
 }
 
 fn copy(from: &Path, to: &Path) {

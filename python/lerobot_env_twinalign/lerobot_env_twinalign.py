@@ -1,4 +1,4 @@
-"""Tasks of twinalign as environments of LeRobot 0.6: `lerobot-eval --policy.path=... --env.type=twinalign --env.task=tasks/pick_carrot.toml`.
+"""Tasks of twinalign as environments of LeRobot 0.6: `lerobot-eval --policy.path=... --env.type=twinalign --env.task=twin/tasks/pick_carrot.toml`.
 
 Observations come under the names that `calibration export-episodes` gives them: `observation.state`, `observation.environment_state`,
 `observation.images.CAMERA`.

@@ -8,7 +8,7 @@ import twinalign.env
 from gymnasium.utils.env_checker import check_env
 
 ROOT = pathlib.Path(__file__).parents[2]
-CARROT, CELL = ROOT / "tasks" / "pick_carrot.toml", ROOT / "config" / "fr3_cell.toml"
+CARROT, CELL = ROOT / "twin" / "tasks" / "pick_carrot.toml", ROOT / "config" / "fr3_cell.toml"
 
 
 def make(**arguments):

@@ -3,7 +3,7 @@
     import gymnasium
     import twinalign.env
 
-    env = gymnasium.make("twinalign/Task-v0", task="tasks/pick_carrot.toml", cell="config/fr3_cell.toml")
+    env = gymnasium.make("twinalign/Task-v0", task="twin/tasks/pick_carrot.toml", cell="config/fr3_cell.toml")
     observation, info = env.reset(seed=3)
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
 

@@ -76,7 +76,7 @@ def judge(task, programs, folder, episodes):
     def run(program, *arguments):
         return subprocess.run([str(programs / program), *map(str, arguments)], check=True, capture_output=True, text=True).stdout
 
-    file = Path("tasks") / f"{task}.toml"
+    file = Path("twin/tasks") / f"{task}.toml"
     clips, data, pictures = folder / "clips", folder / "data", folder / "pictures"
     run("twin", "task", file, "--episodes", episodes, "--noise", 0.002, "--record", clips)
     said = json.loads(run("calibration", "export-episodes", file, clips, "--to", "lerobot", "--every", EVERY, "--out", data, "--json"))

@@ -1,8 +1,8 @@
 """Policies in a cell in MuJoCo that has masses, friction, a lagging arm, a camera and noise of its own, as if it were reality:
 
-    python tests/peers/mujoco_policies.py identified tasks/close_laptop.toml --out laptop_identified.toml
-    python tests/peers/mujoco_policies.py demonstrate tasks/close_laptop.toml --commands laptop_lerobot --out laptop_mujoco
-    python tests/peers/mujoco_policies.py trials tasks/close_laptop.toml --program target/release/twin \\
+    python tests/peers/mujoco_policies.py identified twin/tasks/close_laptop.toml --out laptop_identified.toml
+    python tests/peers/mujoco_policies.py demonstrate twin/tasks/close_laptop.toml --commands laptop_lerobot --out laptop_mujoco
+    python tests/peers/mujoco_policies.py trials twin/tasks/close_laptop.toml --program target/release/twin \\
       --policy twin=ws://localhost:8000 --seed 1000 --episodes 60 --out twin.csv
     python tests/peers/mujoco_policies.py compare twin_0.csv twin_1.csv --to mujoco_0.csv mujoco_1.csv
 

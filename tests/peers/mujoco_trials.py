@@ -1,7 +1,7 @@
 """Scripted policies of several qualities on the tasks that ship, in MuJoCo, as a world for `calibration evaluate`:
 
     python tests/peers/mujoco_trials.py --program target/release/twin --episodes 60 --out mujoco.csv
-    calibration evaluate --policies expert expert:noise=0.005 expert:noise=0.015 --tasks tasks/*.toml --worlds twin,mujoco.csv \\
+    calibration evaluate --policies expert expert:noise=0.005 expert:noise=0.015 --tasks twin/tasks/*.toml --worlds twin,mujoco.csv \\
       --episodes 200 --out against_mujoco
 
 Starts are the twin's; deviates of way points are drawn here, so that a policy with noise is another draw of the same policy.
@@ -22,7 +22,7 @@ try:
 except ModuleNotFoundError as missing:
     sys.exit(f"{missing.name} is not installed; `pip install -r tests/peers/requirements.txt` in a virtual environment")
 
-TASKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tasks")
+TASKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "twin", "tasks")
 
 
 def trial(task, bodies, noise, seed):
@@ -40,7 +40,7 @@ def trial(task, bodies, noise, seed):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", required=True, type=built, metavar="TWIN", help="the built `twin`")
-    parser.add_argument("--tasks", default="", metavar="FILE,..", help="names of files in tasks/ [default: all]")
+    parser.add_argument("--tasks", default="", metavar="FILE,..", help="names of files in twin/tasks/ [default: all]")
     parser.add_argument("--noise", default="0,0.005,0.015", metavar="M,..", help="one sigma of each policy [default: 0,0.005,0.015]")
     parser.add_argument("--episodes", type=int, default=60, metavar="N", help="of each policy on each task [default: 60]")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="the first start [default: 0]")

@@ -20,7 +20,7 @@ try:
 except ModuleNotFoundError as missing:
     sys.exit(f"{missing.name} is not installed; the head of this file says how")
 
-TASKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tasks")
+TASKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "twin", "tasks")
 
 
 class Server:
@@ -64,7 +64,7 @@ def demonstration(programs, task, seed, folder):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--programs", required=True, metavar="FOLDER", help="with the built `twin` and `calibration`")
-    parser.add_argument("--task", default="pick_carrot", metavar="NAME", help="in tasks/ [default: pick_carrot]")
+    parser.add_argument("--task", default="pick_carrot", metavar="NAME", help="in twin/tasks/ [default: pick_carrot]")
     parser.add_argument("--episodes", type=int, default=5, metavar="N")
     given = parser.parse_args()
     ending_by_signals()

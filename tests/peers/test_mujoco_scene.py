@@ -12,7 +12,7 @@ from mujoco_scene.franka import READY, Arm, rotation, wxyz
 from mujoco_scene.hidden import Hidden
 from verdicts import wilson
 
-TASKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tasks")
+TASKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "twin", "tasks")
 
 
 def task(name):

@@ -26,7 +26,7 @@ try:
 except ModuleNotFoundError as missing:
     sys.exit(f"{missing.name} is not installed; `pip install -r tests/peers/requirements.txt` in a virtual environment")
 
-TASKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tasks")
+TASKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "twin", "tasks")
 TABLE = """[[body]]
 name = "table"
 hold = "fixed"
@@ -272,7 +272,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", required=True, type=built, metavar="TWIN", help="the built `twin`")
     parser.add_argument("--only", default="", metavar="A,B", help="stacks, held, lid, arm, tasks, noisy, speed [default: all]")
-    parser.add_argument("--tasks", default="", metavar="FILE,..", help="names of files in tasks/ [default: all]")
+    parser.add_argument("--tasks", default="", metavar="FILE,..", help="names of files in twin/tasks/ [default: all]")
     parser.add_argument("--episodes", type=int, default=20, metavar="N", help="of each task [default: 20]")
     given = parser.parse_args()
     ending_by_signals()

@@ -17,7 +17,7 @@ pub const LONG: Duration = Duration::from_secs(60);
 /// A task that ships.
 #[must_use]
 pub fn task(name: &str) -> String {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks").join(name).display().to_string()
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../twin/tasks").join(name).display().to_string()
 }
 
 /// A running `twin teleop` and where it is.

@@ -111,15 +111,15 @@ pub fn documents() -> Vec<(String, String)> {
 /// The folders with the sources of the product.
 pub const PRODUCT: [&str; 11] = [
     "shared_mem/src",
-    "splat/src",
-    "fusion/src",
-    "reconstruct/src",
-    "urdf/src",
+    "twin/splat/src",
+    "twin/fusion/src",
+    "twin/reconstruct/src",
+    "twin/urdf/src",
     "twin/src",
-    "link/src",
+    "rt_bridge/link/src",
     "rt_bridge/src",
-    "import/src",
-    "evaluation/src",
+    "shared_mem/import/src",
+    "calibration/evaluation/src",
     "calibration/src",
 ];
 

@@ -33,7 +33,7 @@ const OF_OTHERS: [&str; 11] = [
 /// A folder of the sources, and the verbs of which one must have the flags that its messages name.
 const SPOKEN_BY: [(&str, &[&str]); 13] = [
     ("calibration/src/init/", &["calibration init"]),
-    ("import/src/", &["calibration import"]),
+    ("shared_mem/import/src/", &["calibration import"]),
     ("calibration/src/viewpoint/", &["calibration viewpoint"]),
     ("calibration/src/hand_eye/", &["calibration hand-eye"]),
     (
@@ -43,24 +43,20 @@ const SPOKEN_BY: [(&str, &[&str]); 13] = [
     ("calibration/src/demo/", &["calibration demo"]),
     ("rt_bridge/src/run/", &["rt_bridge run"]),
     ("rt_bridge/src/serve/", &["rt_bridge serve"]),
-    ("link/src/", &["rt_bridge link"]),
+    ("rt_bridge/link/src/", &["rt_bridge link"]),
     ("twin/src/viewer/", &["twin shadow"]),
     ("twin/src/teleop/", &["twin teleop"]),
     ("twin/src/reconstruct/", &["twin label-splats"]),
-    ("reconstruct/src/", &["twin reconstruct object", "twin reconstruct articulated", "twin reconstruct scene"]),
+    ("twin/reconstruct/src/", &["twin reconstruct object", "twin reconstruct articulated", "twin reconstruct scene"]),
 ];
 /// Folders whose files are named in texts by their path.
-const FOLDERS: [&str; 11] = [
+const FOLDERS: [&str; 7] = [
     "shared_mem/",
     "twin/",
     "rt_bridge/",
     "calibration/",
-    "import/",
-    "urdf/",
-    "reconstruct/",
     "tests/",
     "config/",
-    "tasks/",
     "docs/",
 ];
 

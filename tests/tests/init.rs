@@ -88,7 +88,7 @@ fn a_urdf_is_named_from_the_folder_of_the_file_and_a_xacro_file_is_expanded() {
 #[test]
 fn a_bag_tells_its_robot_and_its_topics() {
     let lab = tempfile::tempdir().expect("a folder");
-    let bag = root().join("import/tests/fixtures/rosbag2_mcap");
+    let bag = root().join("shared_mem/import/tests/fixtures/rosbag2_mcap");
     let bag = bag.to_str().expect("UTF-8");
     let (answer, cell) = written(lab.path(), &["init", "--bag", bag]);
     assert_eq!(cell.robot.and_then(|robot| robot.model).as_deref(), Some("fr3"));
@@ -113,7 +113,7 @@ fn joints_that_recordings_call_otherwise_than_the_urdf_are_taken_by_place() {
         write!(urdf, "{}", one.replace("shoulder", &format!("axis{i}"))).expect("room");
     }
     std::fs::write(lab.path().join("arm.urdf"), urdf + "</robot>").expect("room");
-    let bag = root().join("import/tests/fixtures/rosbag2_mcap");
+    let bag = root().join("shared_mem/import/tests/fixtures/rosbag2_mcap");
     let bag = bag.to_str().expect("UTF-8");
     let (answer, cell) = written(lab.path(), &["init", "--urdf", "arm.urdf", "--bag", bag]);
     let recorded: Vec<String> = (1..=7).map(|i| format!("fr3_joint{i}")).collect();

@@ -104,7 +104,7 @@ fn commands() -> Vec<(&'static str, String, &'static str)> {
             "calibration",
             format!(
                 "evaluate --policies expert --tasks {} --episodes 100000 --out {{dir}}/evaluation",
-                root().join("tasks/pick_carrot.toml").display()
+                root().join("twin/tasks/pick_carrot.toml").display()
             ),
             found,
         ),
@@ -112,7 +112,7 @@ fn commands() -> Vec<(&'static str, String, &'static str)> {
             "calibration",
             format!(
                 "policy run --policy expert --task {} --episodes 100000",
-                root().join("tasks/pick_carrot.toml").display()
+                root().join("twin/tasks/pick_carrot.toml").display()
             ),
             found,
         ),
@@ -122,7 +122,7 @@ fn commands() -> Vec<(&'static str, String, &'static str)> {
         ("twin", line("render {dir}/pictures --out {dir}/frames"), found),
         ("twin", format!("label-splats {{dir}}/scan.ply --cell {{cell}} --joints {JOINTS} --out {{dir}}/links"), found),
         ("twin", line("shadow --cell {cell}"), ""),
-        ("twin", format!("teleop --port 0 --task {}", root().join("tasks/push_milk.toml").display()), ""),
+        ("twin", format!("teleop --port 0 --task {}", root().join("twin/tasks/push_milk.toml").display()), ""),
         ("rt_bridge", line("run --cell {cell} --arm sim --realtime ignore --record {dir}/live.mcap"), ""),
         ("rt_bridge", line("record --out {dir}/alone.mcap"), ""),
         ("rt_bridge", line("serve --cell {cell} --port 0 --no-hand"), ""),

@@ -48,7 +48,7 @@ fn serve(act: impl Fn(&[f32]) -> Vec<f32> + Send + 'static) -> (String, Arc<Mute
 fn a_policy_acts_on_the_arm_of_a_running_bridge_and_what_is_beyond_its_limits_ends_the_episode() {
     let cell = Cell::shipped();
     let bridge = cell.start_bridge(&["--gripper", "sim"]);
-    let text = std::fs::read_to_string(root().join("tasks/pick_carrot.toml")).expect("a task that ships");
+    let text = std::fs::read_to_string(root().join("twin/tasks/pick_carrot.toml")).expect("a task that ships");
     std::fs::write(cell.path("task.toml"), text.replace("horizon = 10.0", "horizon = 2.5")).expect("room");
     let run = |address: &str, more: &[&str]| {
         let mut line =

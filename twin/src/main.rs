@@ -19,8 +19,8 @@ Examples:
   twin shadow --cell config/fr3_cell.toml --viewer
   twin replay session --parameters theta.toml
   twin render session --out frames
-  twin task tasks/push_milk.toml
-  twin teleop --task tasks/pick_carrot.toml --record carrot
+  twin task twin/tasks/push_milk.toml
+  twin teleop --task twin/tasks/pick_carrot.toml --record carrot
   twin reconstruct object scan --out mug --mass 0.118
   twin reconstruct scene cell_scan --out cell_scene
   twin label-splats scan.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --out fr3_splats

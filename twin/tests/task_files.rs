@@ -8,7 +8,7 @@ use twin::arm::ArmModel;
 use twin::task::{Run, Task};
 
 fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../twin/tasks").join(name)
 }
 
 /// The rows without the gripper's force, which nobody knows: what is no number equals nothing.

@@ -37,9 +37,9 @@ predicts those of files (Pearson's correlation, mean maximum rank violation), su
 many simulated ones, and films of failures. After Ctrl-C the same command goes on.
 
 Examples:
-  calibration evaluate --policies expert expert:noise=0.005 --tasks tasks/pick_carrot.toml --out carrot
-  calibration evaluate --policies mine=ws://localhost:8000 --tasks tasks/push_milk.toml --episodes 200 --out mine
-  calibration evaluate --policies mine=ws://localhost:8000 --tasks tasks/push_milk.toml --worlds twin,nominal,robot.csv \\
+  calibration evaluate --policies expert expert:noise=0.005 --tasks twin/tasks/pick_carrot.toml --out carrot
+  calibration evaluate --policies mine=ws://localhost:8000 --tasks twin/tasks/push_milk.toml --episodes 200 --out mine
+  calibration evaluate --policies mine=ws://localhost:8000 --tasks twin/tasks/push_milk.toml --worlds twin,nominal,robot.csv \\
     --cell config/fr3_cell.toml --theta theta.toml --episodes 200 --out mine
 
 JSON: that of findings.json: level, cells (world, policy, task, successes, trials, success, interval, progress, smallest_difference),

@@ -44,9 +44,9 @@ Examples:
   calibration import last_week --out session
   calibration init --urdf arm.urdf --out cell.toml
   calibration export session --to rosbag2 --out bags
-  calibration export-episodes tasks/pick_carrot.toml carrot --to lerobot --out carrot_lerobot
+  calibration export-episodes twin/tasks/pick_carrot.toml carrot --to lerobot --out carrot_lerobot
   calibration export-model theta.toml --cell cell.toml --to mjcf --out cell.xml
-  calibration evaluate --policies expert --tasks tasks/pick_carrot.toml --out carrot
+  calibration evaluate --policies expert --tasks twin/tasks/pick_carrot.toml --out carrot
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
 pub(crate) struct Arguments {
@@ -104,7 +104,7 @@ Examples:
         subcommand,
         after_help = "\
 Examples:
-  calibration policy run --task tasks/pick_carrot.toml --policy ws://localhost:8000 --episodes 10"
+  calibration policy run --task twin/tasks/pick_carrot.toml --policy ws://localhost:8000 --episodes 10"
     )]
     Policy(policy::Policy),
     /// Many runs of other verbs as units: on many cores and machines, going on after a kill, merged without gaps.

@@ -41,10 +41,10 @@ Free bodies are not known then, and whether it was a success is for a person to 
 puts things back.
 
 Examples:
-  calibration policy run --task tasks/pick_carrot.toml --policy ws://localhost:8000 --episodes 10 --record tried
-  calibration policy run --task tasks/push_milk.toml --policy ws://localhost:8000 --cell config/fr3_cell.toml --json
-  calibration policy run --task tasks/pick_carrot.toml --policy act.onnx --rate 20 --chunk 10
-  calibration policy run --task tasks/push_milk.toml --policy ws://localhost:8000 --robot --cell config/fr3_cell.toml --record tried
+  calibration policy run --task twin/tasks/pick_carrot.toml --policy ws://localhost:8000 --episodes 10 --record tried
+  calibration policy run --task twin/tasks/push_milk.toml --policy ws://localhost:8000 --cell config/fr3_cell.toml --json
+  calibration policy run --task twin/tasks/pick_carrot.toml --policy act.onnx --rate 20 --chunk 10
+  calibration policy run --task twin/tasks/push_milk.toml --policy ws://localhost:8000 --robot --cell config/fr3_cell.toml --record tried
 
 JSON: task, policy, successes, trials, and for each of episodes start, success (null on a robot), progress, duration_s, fault, missed, clip.")]
 pub(super) struct RunArguments {

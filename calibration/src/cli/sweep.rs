@@ -33,7 +33,7 @@ folder of the unit's own. --json is added. A unit's result is the JSON object th
 Its hash is that of the command, of the program's build, and of all files and folders that the command names: when one of them changes, the
 sweep has to be planned again. Files may have any size; a link counts as what it leads to, each folder once. With the line
 `benchmark --null 1 --seed {seed}`, or
-`evaluate --policies expert:noise={noise} --tasks tasks/push_milk.toml --seed {seed} --out {out}`:
+`evaluate --policies expert:noise={noise} --tasks twin/tasks/push_milk.toml --seed {seed} --out {out}`:
 
 Examples:
   calibration sweep plan commands.txt --each seed=0..200 --out sweep

@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn the_page_shows_shares_worlds_and_films_of_failures() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks/push_milk.toml");
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../twin/tasks/push_milk.toml");
         let task = Arc::new(Task::read(&file).expect("a task that ships"));
         let world = World { name: "twin".into(), tasks: vec![task], description: String::new() };
         let policies = ["expert", "worse=expert:noise=0.05", "worst=expert:noise=0.3"];

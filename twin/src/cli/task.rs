@@ -22,11 +22,11 @@ a scripted motion; docs/tasks.md has every key. An episode ends with success, or
 episode becomes a clip of its own in a folder, named by its seed; those that are finished stay whatever happens to the rest.
 
 Examples:
-  twin task tasks/push_milk.toml
-  twin task tasks/stack_boxes.toml --seed 3 --duration 5
-  twin task tasks/close_laptop.toml --episodes 50 --out laptop.json
-  twin task tasks/pick_carrot.toml --episodes 50 --noise 0.003 --record carrot
-  twin task tasks/pick_carrot.toml --json
+  twin task twin/tasks/push_milk.toml
+  twin task twin/tasks/stack_boxes.toml --seed 3 --duration 5
+  twin task twin/tasks/close_laptop.toml --episodes 50 --out laptop.json
+  twin task twin/tasks/pick_carrot.toml --episodes 50 --noise 0.003 --record carrot
+  twin task twin/tasks/pick_carrot.toml --json
 
 JSON: task, successes, and for each of episodes seed, duration_s, at_rest, at_rest_since_s, success, progress (0 to 1: how far it
 came), missed (conditions that did not hold at the end), arm_fault (what the arm cannot do of the motion), contacts (names of bodies that press on each other), and bodies: name, start and end (position, orientation_wxyz, joint), speed_m_s.")]

@@ -20,10 +20,10 @@ the gripper. An episode begins at a button and ends with success, at a button, o
 kept becomes a clip, as with `twin task --record`. The first page steers, others watch. docs/teleop.md has keys and messages.
 
 Examples:
-  twin teleop --task tasks/pick_carrot.toml
-  twin teleop --task tasks/pick_carrot.toml --record carrot
-  twin teleop --task tasks/push_milk.toml --record milk --seed 100 --bind 0.0.0.0 --port 8400
-  twin teleop --task tasks/push_milk.toml --bind 0.0.0.0 --name bench.lab.example
+  twin teleop --task twin/tasks/pick_carrot.toml
+  twin teleop --task twin/tasks/pick_carrot.toml --record carrot
+  twin teleop --task twin/tasks/push_milk.toml --record milk --seed 100 --bind 0.0.0.0 --port 8400
+  twin teleop --task twin/tasks/push_milk.toml --bind 0.0.0.0 --name bench.lab.example
 
 Escape stops: the arm holds until an episode is started. Every page can stop, also one that watches.
 

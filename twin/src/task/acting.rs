@@ -264,7 +264,7 @@ mod tests {
     use std::path::Path;
 
     fn task(name: &str) -> Task {
-        Task::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks").join(name)).expect("a task that ships")
+        Task::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../twin/tasks").join(name)).expect("a task that ships")
     }
 
     /// What a scripted run commands, twenty times a second, as a policy that knows it by heart.

@@ -132,7 +132,7 @@ mod tests {
     fn a_laptop_out_of_a_urdf_is_the_one_of_the_task_file() {
         let task =
             with(LAPTOP, "friction = 0.5\nposition = [0.5, 0.0, 0.009]\njoints = { hinge = -0.3 }\n").expect("a task");
-        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks/close_laptop.toml");
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("tasks/close_laptop.toml");
         let shipped = Task::read(&shipped).expect("a task");
         assert_eq!(
             task.bodies().iter().map(|body| body.name.as_str()).collect::<Vec<_>>(),

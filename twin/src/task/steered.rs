@@ -291,7 +291,7 @@ mod tests {
     use std::path::Path;
 
     fn task(name: &str) -> Arc<Task> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks").join(name);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../twin/tasks").join(name);
         Arc::new(Task::read(&path).expect("a task that ships"))
     }
 

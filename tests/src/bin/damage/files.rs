@@ -116,7 +116,7 @@ pub(crate) const LOGS: [&str; 10] = [
 ];
 
 fn fixtures() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../import/tests/fixtures")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared_mem/import/tests/fixtures")
 }
 
 /// Copies a file, or a folder with all that is in it.

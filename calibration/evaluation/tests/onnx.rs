@@ -30,7 +30,7 @@ fn open(file: PathBuf) -> Result<Policy, String> {
 }
 
 fn task() -> Arc<Task> {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks/pick_carrot.toml");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../twin/tasks/pick_carrot.toml");
     Arc::new(Task::read(&file).expect("a task that ships"))
 }
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Writes the logs that the tests import, each with the tool of its own format.
 
-    python3 -m venv venv && venv/bin/pip install -r import/tests/requirements.txt
-    venv/bin/python import/tests/make_fixtures.py import/tests/fixtures
+    python3 -m venv venv && venv/bin/pip install -r shared_mem/import/tests/requirements.txt
+    venv/bin/python shared_mem/import/tests/make_fixtures.py shared_mem/import/tests/fixtures
 
 The motion is a formula (see `motion` below, and `motion` of tests/formats.rs), so that a test knows every number.
 """

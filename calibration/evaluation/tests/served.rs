@@ -15,7 +15,7 @@ use twin::task::{Numbers, Run, Signs, Task};
 type Answer = fn() -> Option<Message>;
 
 fn task() -> Arc<Task> {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks/pick_carrot.toml");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../twin/tasks/pick_carrot.toml");
     Arc::new(Task::read(&file).expect("a task that ships"))
 }
 

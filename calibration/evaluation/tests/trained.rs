@@ -34,7 +34,7 @@ type Pair = (Vec<f32>, Vec<f32>);
 /// The laptop, without cameras: numbers are all that this policy sees. (The milk box goes into its groove under the mean of all
 /// actions, too.)
 fn task() -> Arc<Task> {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tasks/close_laptop.toml");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../twin/tasks/close_laptop.toml");
     let text = std::fs::read_to_string(file).expect("a task that ships");
     let (before, after) = text.split_once("[[camera]]").expect("a camera");
     let behind = after.find("\n[[").expect("more blocks");
