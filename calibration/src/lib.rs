@@ -28,6 +28,7 @@
 //! | [`kept`] | what long work has found so far, for when it is interrupted |
 //! | `child_output` | what other programs say on their pipes |
 //! | [`seed`] | what is drawn is drawn from it |
+//! | [`statistics`] | medians, and quantiles of distributions |
 //!
 //! # Words
 //!
@@ -73,6 +74,7 @@ pub mod page;
 pub mod processes;
 pub mod report;
 pub mod seed;
+pub mod statistics;
 pub mod study;
 pub mod sweep;
 pub mod viewpoint;

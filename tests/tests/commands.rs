@@ -50,15 +50,7 @@ const SPOKEN_BY: [(&str, &[&str]); 13] = [
     ("twin/reconstruct/src/", &["twin reconstruct object", "twin reconstruct articulated", "twin reconstruct scene"]),
 ];
 /// Folders whose files are named in texts by their path.
-const FOLDERS: [&str; 7] = [
-    "shared_mem/",
-    "twin/",
-    "rt_bridge/",
-    "calibration/",
-    "tests/",
-    "config/",
-    "docs/",
-];
+const FOLDERS: [&str; 7] = ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "tests/", "config/", "docs/"];
 
 fn named(verb: &Verb) -> String {
     verb.path.join(" ")

@@ -3,7 +3,7 @@
 
 use crate::diagnose::criteria::{self, Criterion};
 use crate::diagnose::{SensorGap, Sensors};
-use crate::estimate::interval::student;
+use crate::statistics::student_sigmas;
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use shared_mem::input;
@@ -223,7 +223,7 @@ fn quantile(values: impl Iterator<Item = f64>) -> (Option<f64>, usize) {
     let mean = logarithms.iter().sum::<f64>() / n as f64;
     let variance = logarithms.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1) as f64;
     let spread = (variance * (1.0 + 1.0 / n as f64)).sqrt();
-    (Some((mean + student(NINETY_EIGHT, n - 1) * spread).exp()), n)
+    (Some((mean + student_sigmas(NINETY_EIGHT, n - 1) * spread).exp()), n)
 }
 
 /// A share of sessions, as the mean of Jeffreys' posterior: no share is certain after few.

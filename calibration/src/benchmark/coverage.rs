@@ -8,6 +8,7 @@ use super::{draw, trial};
 use crate::diagnose::{self, Diagnosis, diagnose_clips};
 use crate::identify::{Identification, arm, object};
 use crate::interrupt::Interrupt;
+use crate::statistics;
 use serde::{Deserialize, Serialize};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
@@ -198,18 +199,13 @@ pub fn covered(sessions: &[Session], level: f64) -> BTreeMap<String, Covered> {
     by_name.into_iter().map(|(name, printed)| (name, Covered::of(&printed, level))).collect()
 }
 
-/// Quantile of a normal distribution at the level, in sigmas.
-fn quantile(level: f64) -> f64 {
-    if level > 0.92 { 1.96 } else { 1.645 }
-}
-
 impl Covered {
     fn of(printed: &[&Printed], level: f64) -> Self {
         let count = |of: fn(&Printed) -> bool| printed.iter().filter(|printed| of(printed)).count();
         let half = |printed: &Printed| 0.5 * (printed.interval[1] - printed.interval[0]);
         let z = |printed: &&&Printed| {
             let half = half(printed);
-            (half > 0.0).then(|| quantile(level) * (printed.value - printed.truth) / half)
+            (half > 0.0).then(|| statistics::normal(level) * (printed.value - printed.truth) / half)
         };
         let z: Vec<f64> = printed.iter().filter_map(|printed| z(&printed)).collect();
         let mut halves: Vec<f64> = printed.iter().map(|printed| half(printed)).collect();

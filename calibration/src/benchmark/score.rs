@@ -1,6 +1,7 @@
 //! Scores of a diagnosis over many worlds: how often it was right, false, silent, and whether its confidence was earned.
 //! Rates come with exact (Clopper-Pearson) 95 % intervals.
 
+use crate::statistics;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -119,6 +120,7 @@ impl Scores {
         }
         let nothing = cases.iter().filter(|case| case.truth == Truth::Nothing);
         let outside = cases.iter().filter(|case| matches!(case.truth, Truth::Outside(_)));
+        let shrinks = testable(1).map(|case| case.said.shrink / case.oracle_shrink);
         Self {
             top1: Rate::count(testable(1).map(Case::named_exactly)),
             top1_or_class: Rate::count(testable(1).map(|case| case.named_exactly() || case.in_class())),
@@ -126,7 +128,7 @@ impl Scores {
             exact_pair: Rate::count(testable(2).map(Case::named_exactly)),
             false_alarms: Rate::count(nothing.map(|case| case.said.verdict == "named")),
             refusals: Rate::count(outside.map(|case| case.said.verdict != "named")),
-            shrink_of_oracle: median(testable(1).map(|case| case.said.shrink / case.oracle_shrink).collect()),
+            shrink_of_oracle: statistics::median(shrinks.filter(|shrink| shrink.is_finite())).unwrap_or(f64::NAN),
             calibration_error: calibration_error(cases),
             by_effect: by_effect.into_iter().map(|(name, hits)| (name, Rate::count(hits.into_iter()))).collect(),
             confusion,
@@ -193,12 +195,6 @@ fn sorted(names: &[String]) -> Vec<String> {
     let mut names = names.to_vec();
     names.sort();
     names
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.retain(|value| value.is_finite());
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// Mean confidence and share of true verdicts in each of ten bins of confidence that holds any, lowest first.

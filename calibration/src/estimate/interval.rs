@@ -7,6 +7,7 @@
 
 use super::least_squares::Fit;
 use super::problem::Unknown;
+use crate::statistics;
 use nalgebra::{DMatrix, DVector};
 
 /// How sure a fit is about its shared numbers.
@@ -26,8 +27,8 @@ pub struct Intervals {
 
 /// Below this share of its own information a number is what the others make of it.
 const COLLINEAR: f64 = 1e-10;
-/// Two-sided 95 % of a normal distribution, in sigmas.
-const NORMAL_95: f64 = 1.959_964;
+/// Level of all intervals of parameters [1].
+pub const LEVEL: f64 = 0.95;
 
 impl Intervals {
     /// At the fit's numbers. Those in `held` were not free: they rest on a bound, or nothing depends on them.
@@ -45,9 +46,9 @@ impl Intervals {
         let known = |k: usize| inverse[(k, k)] > 0.0;
         let sigma = |m: &DMatrix<f64>| (0..n).map(|k| m[(k, k)].max(0.0).sqrt()).collect::<Vec<_>>();
         let (model_sigma, witness_sigma) = (sigma(&inverse), sigma(&sandwich));
-        let t = student_95(witnesses.saturating_sub(1));
+        let (z, t) = (statistics::normal(LEVEL), statistics::student(LEVEL, witnesses.saturating_sub(1)));
         let half_width = (0..n)
-            .map(|k| if known(k) { (NORMAL_95 * model_sigma[k]).max(t * witness_sigma[k]) } else { f64::INFINITY })
+            .map(|k| if known(k) { (z * model_sigma[k]).max(t * witness_sigma[k]) } else { f64::INFINITY })
             .collect();
         let correlation = DMatrix::from_fn(n, n, |i, j| {
             if known(i) && known(j) { inverse[(i, j)] / (model_sigma[i] * model_sigma[j]) } else { 0.0 }
@@ -130,26 +131,6 @@ fn spread(part: &DMatrix<f64>, free: &[usize], n: usize) -> DMatrix<f64> {
     whole
 }
 
-/// Two-sided 95 % quantile of Student's t.
-pub(crate) fn student_95(degrees: usize) -> f64 {
-    match degrees {
-        0 => f64::INFINITY,
-        1 => 12.706,
-        2 => 4.303,
-        _ => student(NORMAL_95, degrees),
-    }
-}
-
-/// The quantile of Student's t at the probability of `z` in a normal distribution (Abramowitz & Stegun 26.7.5, right to 1 %
-/// from 3 degrees of freedom on at 95 %, to 5 % at 99.9 %).
-pub(crate) fn student(z: f64, degrees: usize) -> f64 {
-    let n = degrees.max(1) as f64;
-    let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
-    z + (z3 + z) / (4.0 * n)
-        + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n * n)
-        + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n.powi(3))
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::{ClipModel, Impossible, Options, fit};
@@ -212,13 +193,6 @@ mod tests {
         for lasting in [1, 10] {
             let share = covered(lasting);
             assert!((0.92..0.995).contains(&share), "noise that lasts {lasting} rows: {share}");
-        }
-    }
-
-    #[test]
-    fn quantiles_are_those_of_the_tables() {
-        for (degrees, table) in [(1, 12.706), (4, 2.776), (10, 2.228), (60, 2.000)] {
-            assert!((student_95(degrees) / table - 1.0).abs() < 0.01, "{degrees}: {}", student_95(degrees));
         }
     }
 }

@@ -229,12 +229,8 @@ fn own_promise(best: &Fit) -> f64 {
     best.clips.iter().map(gain).sum()
 }
 
-fn penalty(random: &[Random], own: &[f64]) -> f64 {
-    random.iter().zip(own).filter(|(effect, _)| effect.sigma > 0.0).map(|(effect, u)| (u / effect.sigma).powi(2)).sum()
-}
-
 fn current(best: &Fit, random: &[Random]) -> f64 {
-    best.clips.iter().map(|clip| clip.chi2 + penalty(random, &clip.own)).sum()
+    best.clips.iter().map(|clip| clip.chi2 + Random::penalty(random, &clip.own)).sum()
 }
 
 /// Sum of squared residuals and of the own numbers in their sigmas; `None` where the model has no answer.
@@ -245,7 +241,7 @@ fn cost(model: &impl ClipModel, random: &[Random], shared: &[f64], own: &[Vec<f6
             let mut out = Vec::new();
             model.residuals(clip, shared, &own[clip], &mut out).ok()?;
             let chi2: f64 = out.iter().map(|r| r * r).sum();
-            chi2.is_finite().then_some(chi2 + penalty(random, &own[clip]))
+            chi2.is_finite().then_some(chi2 + Random::penalty(random, &own[clip]))
         })
         .collect();
     costs.into_iter().sum()

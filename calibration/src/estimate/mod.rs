@@ -19,7 +19,6 @@
 //! | `views` | a model with its calls counted, with numbers given, with some of its clips |
 //! | [`sandwich`] | how far an answer scatters, by witnesses that are each wrong in their own way |
 //! | [`plane`] | slopes through the origin, with their standard errors |
-//! | [`scatter`] | how much own numbers scatter, from the clips |
 //!
 //! Residuals are in units of their standard deviation. Everything is deterministic: clips are worked on by many threads,
 //! but always summed in their order.
@@ -35,7 +34,6 @@ pub mod linear;
 pub mod plane;
 pub mod problem;
 pub mod sandwich;
-pub mod scatter;
 pub mod search;
 pub mod swarm;
 mod views;

@@ -48,6 +48,20 @@ pub struct Random {
     pub step: f64,
 }
 
+impl Random {
+    /// The square of a clip's value in its sigmas; 0 of one that is held.
+    #[must_use]
+    pub fn square(&self, value: f64) -> f64 {
+        if self.sigma > 0.0 { (value / self.sigma).powi(2) } else { 0.0 }
+    }
+
+    /// `-2 ln` of the normal prior density of a clip's values, but for a constant.
+    #[must_use]
+    pub fn penalty(random: &[Self], values: &[f64]) -> f64 {
+        random.iter().zip(values).map(|(random, value)| random.square(*value)).sum()
+    }
+}
+
 /// The model has no answer there: the simulation left all bounds, or a number has no meaning.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]

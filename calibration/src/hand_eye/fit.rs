@@ -3,10 +3,10 @@
 
 use super::chain::Chain;
 use super::closed_form;
-use super::quantile;
 use super::refine::{Prepared, Refined, refined};
 use super::variance::ArmSigma;
 use super::view::View;
+use crate::statistics;
 use nalgebra::{Isometry3, Matrix6, SMatrix, Vector3};
 use shared_mem::hand_eye::Mount;
 
@@ -172,7 +172,7 @@ fn chances(prepared: &[Prepared<'_>], found: &Refined, used: &[bool], pixel: f64
         } else {
             found.distance(&found.observation(picture, pixel)?, false)?
         };
-        Some(quantile::beyond_f(distance / 6.0, 6, free(count - usize::from(*used))))
+        Some(statistics::beyond_f(distance / 6.0, 6, free(count - usize::from(*used))))
     };
     prepared.iter().zip(used).map(chance).map(|chance| chance.unwrap_or(0.0)).collect()
 }
@@ -185,7 +185,7 @@ fn answer(
     pixel: f64,
 ) -> Fit {
     let count = used.iter().filter(|used| **used).count();
-    let t = quantile::student(LEVEL, free(count));
+    let t = statistics::student(LEVEL, free(count));
     let covariance = found.information.try_inverse().unwrap_or_else(|| SMatrix::identity() * f64::INFINITY);
     let covariance: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 0).into_owned();
     let chances = chances(prepared, found, used, pixel);

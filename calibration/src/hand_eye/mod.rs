@@ -11,7 +11,6 @@
 //! | [`variance`] | how wrong the arm's poses are |
 //! | [`refine`] | all pixels at once |
 //! | [`fit`] | all of it, pictures left out, intervals, what is left open |
-//! | `quantile` | Student's and Fisher's distributions |
 //! | [`simulated`] | pictures of which the truth is known |
 
 pub mod answer;
@@ -20,7 +19,6 @@ pub mod closed_form;
 pub mod command;
 pub mod fit;
 pub mod input;
-mod quantile;
 pub mod refine;
 pub mod simulated;
 pub mod variance;

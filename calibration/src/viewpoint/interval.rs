@@ -9,8 +9,9 @@
 //! when the edges are explained otherwise is what is not known of that, and comes on top.
 
 use super::refine::{Group, Refined};
-use crate::estimate::interval::student_95;
+use crate::estimate::interval::LEVEL;
 use crate::estimate::sandwich::{Witness, covariance};
+use crate::statistics::student;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector6};
 use serde::Serialize;
 
@@ -56,7 +57,7 @@ pub fn interval(refined: &Refined, frames: usize) -> Option<Interval> {
     slopes.fixed_view_mut::<3, 3>(0, 3).copy_from(&-turn.matrix());
     slopes.fixed_view_mut::<3, 3>(3, 0).copy_from(&-turn.matrix());
     let covariance = slopes * scatter * slopes.transpose();
-    let t = student_95(count - 1);
+    let t = student(LEVEL, count - 1);
     let half = |i: usize| t * covariance[(i, i)].max(0.0).sqrt();
     Some(Interval { position: [half(0), half(1), half(2)], rotation: [half(3), half(4), half(5)], witnesses: count })
 }

@@ -26,17 +26,6 @@ pub fn set_fifo(priority: i32) -> io::Result<()> {
     outcome(rc)
 }
 
-/// Puts the calling thread back under the ordinary scheduler.
-///
-/// # Errors
-/// The kernel's.
-pub fn set_ordinary() -> io::Result<()> {
-    let parameters = libc::sched_param { sched_priority: 0 };
-    // SAFETY: thread id 0 is the calling thread; the pointer is to a live, initialised struct.
-    let rc = unsafe { libc::sched_setscheduler(0, libc::SCHED_OTHER, &raw const parameters) };
-    outcome(rc)
-}
-
 /// Binds the calling thread to one core.
 ///
 /// # Errors
@@ -88,16 +77,6 @@ pub fn may_lock_all_memory() -> bool {
     // SAFETY: takes nothing and cannot fail.
     let superuser = unsafe { libc::geteuid() } == 0;
     superuser || matches!(limit(Limit::LockedMemory), Ok((None, _)))
-}
-
-/// Lets memory be swapped again.
-///
-/// # Errors
-/// The kernel's.
-pub fn unlock_memory() -> io::Result<()> {
-    // SAFETY: takes nothing.
-    let rc = unsafe { libc::munlockall() };
-    outcome(rc)
 }
 
 /// Lets the calling thread's timers be as exact as the clock. Linux gathers those of ordinary threads within 50 us; those of

@@ -11,8 +11,8 @@ use super::subjects::Subject;
 use super::turned::{Acts, Side, Turned};
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::quadratic::minimum;
-use crate::estimate::interval::student;
 use crate::page::UNBOUNDED;
+use crate::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -93,6 +93,6 @@ impl Spread {
         let mean = differences.iter().sum::<f64>() / clips.max(1.0);
         let squares: f64 = differences.iter().map(|difference| (difference - mean).powi(2)).sum();
         let jackknife = (squares * (clips - 1.0).max(0.0) / clips.max(1.0)).sqrt();
-        (NINETY_FIVE * curvature).max(student(NINETY_FIVE, self.shifts.len().saturating_sub(1)) * jackknife)
+        (NINETY_FIVE * curvature).max(student_sigmas(NINETY_FIVE, self.shifts.len().saturating_sub(1)) * jackknife)
     }
 }

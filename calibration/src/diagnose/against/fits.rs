@@ -3,14 +3,13 @@
 use super::turned::{Model, SIDES, Side, TwoSessions, side_of};
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::evidence::measured::Evidence;
-use crate::diagnose::evidence::noise::median;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out;
 use crate::diagnose::judge::score::{Predicted, predict};
 use crate::diagnose::judge::trial::NEARLY_ALL;
-use crate::estimate::interval::student;
+use crate::statistics::{median, student_sigmas};
 
 /// What all fits share.
 pub(super) struct PairBench<'a, E> {
@@ -65,7 +64,7 @@ impl Worth {
             // What a change gains in one session says nothing about what it gains in the other.
             let mut of_side: Vec<f64> =
                 gains.iter().filter(|(clip, _)| side_of(*clip, first_of_b) == side).map(|(_, gain)| *gain).collect();
-            let most = (OUTSTANDING * median(&of_side.iter().map(|gain| gain.abs()).collect::<Vec<_>>())).max(LEAST);
+            let most = (OUTSTANDING * median(of_side.iter().map(|gain| gain.abs())).unwrap_or(0.0)).max(LEAST);
             of_side.iter_mut().for_each(|gain| *gain = gain.clamp(-most, most));
             let count = of_side.len() as f64;
             let mean = of_side.iter().sum::<f64>() / count.max(1.0);
@@ -84,7 +83,7 @@ impl Worth {
 
     /// What chance may be worth.
     pub(super) fn chance(&self) -> f64 {
-        student(CHANCE, self.clips.saturating_sub(2)) * self.error
+        student_sigmas(CHANCE, self.clips.saturating_sub(2)) * self.error
     }
 }
 

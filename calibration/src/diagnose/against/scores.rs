@@ -14,7 +14,7 @@ use crate::diagnose::fit::floor;
 use crate::diagnose::fit::quadratic::{bounded_minimum, eliminate, minimum};
 use crate::diagnose::fit::shortlist::{Scored, chance};
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
-use crate::estimate::interval::student;
+use crate::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 
 /// A change as the slopes have it.
@@ -118,7 +118,7 @@ impl Slopes {
         let slopes: Vec<f64> = clips.map(of_clip).collect();
         let count = slopes.len();
         let spread = slopes.iter().map(|slope| slope * slope).sum::<f64>() * count as f64 / (count.max(2) - 1) as f64;
-        let by_clips = student(1.0, count.saturating_sub(1)) * spread.sqrt() / information;
+        let by_clips = student_sigmas(1.0, count.saturating_sub(1)) * spread.sqrt() / information;
         information.sqrt().recip().max(by_clips)
     }
 }

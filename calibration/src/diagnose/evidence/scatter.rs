@@ -90,8 +90,8 @@ impl Scatter {
     #[must_use]
     pub fn penalty(&self, own: &[f64]) -> f64 {
         let light = (self.random.iter().enumerate())
-            .filter(|(k, random)| random.sigma > 0.0 && !self.heavy.contains(k))
-            .map(|(k, random)| (own[k] / random.sigma).powi(2));
+            .filter(|(k, _)| !self.heavy.contains(k))
+            .map(|(k, random)| random.square(own[k]));
         light.sum::<f64>() + self.tails(own)
     }
 

@@ -8,9 +8,10 @@ use super::quadratic::minimum;
 use super::shortlist;
 use super::sweep::{Column, Swept};
 use crate::diagnose::evidence::measured::{Channel, Group, Measured};
-use crate::diagnose::evidence::noise::{correlation_length, median};
+use crate::diagnose::evidence::noise::correlation_length;
 use crate::diagnose::library::Library;
 use crate::estimate::Impossible;
+use crate::statistics::median;
 use nalgebra::{DMatrix, DVector};
 
 /// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any
@@ -45,7 +46,7 @@ fn weight(evidence: &impl Measured, clips: &[(usize, Vec<f64>)], channel: usize)
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     // Some strokes go their own way, and where a hit is linearised some clips tell nothing: they must not silence the others.
     let alone = evidence.channels()[channel].group == Group::Arm;
-    let power = if alone { mean(&powers) } else { median(&powers) };
+    let power = if alone { mean(&powers) } else { median(powers).unwrap_or(0.0) };
     let (power, length) = (power.max(1.0), mean(&lengths).max(1.0));
     // White residuals of a channel have a length a little above one by chance.
     let length = if length < 1.5 { 1.0 } else { length };

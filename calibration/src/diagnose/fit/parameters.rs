@@ -10,9 +10,9 @@
 use super::bench::{Bench, Hypothesis};
 use super::quadratic::minimum;
 use crate::diagnose::evidence::measured::Evidence;
-use crate::estimate::interval::student;
 use crate::forward::setting::Setting;
 use crate::page::{Size, UNBOUNDED};
+use crate::statistics::student_sigmas;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};
@@ -98,6 +98,6 @@ fn half_widths<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Ve
         let squares: f64 = shifts.iter().map(|shift| (shift[k] - mean).powi(2)).sum();
         (squares * (clips - 1.0) / clips).sqrt()
     };
-    let t = student(NINETY, hypothesis.fitted.len().saturating_sub(1));
+    let t = student_sigmas(NINETY, hypothesis.fitted.len().saturating_sub(1));
     (0..count).map(|k| (NINETY * curvature[k]).max(t * jackknife(k))).collect()
 }

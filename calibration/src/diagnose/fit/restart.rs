@@ -7,7 +7,7 @@
 use super::bench::{Bench, Clips};
 use super::sweep::Precision;
 use crate::diagnose::evidence::measured::Measured;
-use crate::diagnose::evidence::noise::median;
+use crate::statistics::median;
 use nalgebra::DVector;
 
 /// A clip stands out that costs so many times the typical distance from the median more than the median does, and at least
@@ -66,8 +66,8 @@ impl<E: Measured> Bench<'_, E> {
 
 /// Those that stand out among costs.
 fn outstanding(costs: &[f64]) -> Vec<usize> {
-    let middle = median(costs);
-    let typical = median(&costs.iter().map(|cost| (cost - middle).abs()).collect::<Vec<_>>());
+    let Some(middle) = median(costs.iter().copied()) else { return Vec::new() };
+    let typical = median(costs.iter().map(|cost| (cost - middle).abs())).unwrap_or(0.0);
     let most = middle + LEAST.max(OUTSTANDING * typical);
     (0..costs.len()).filter(|place| costs[*place] > most).collect()
 }

@@ -3,7 +3,7 @@
 use super::trial::{Step, Trial, net};
 use crate::diagnose::criteria::NAMED_IS_WRONG;
 use crate::diagnose::library::Library;
-use crate::estimate::interval::student;
+use crate::statistics::student_sigmas;
 
 /// Rivals this close cannot be told apart [nats].
 const NEAR: f64 = 4.0;
@@ -66,7 +66,7 @@ pub fn alike(beyond: f64, error: f64, clips: usize) -> bool {
 /// [`CHANCE`] where the error is itself told from so few clips: the quantile of Student's distribution at the same
 /// probability.
 fn chance(clips: usize) -> f64 {
-    student(CHANCE, clips.saturating_sub(1))
+    student_sigmas(CHANCE, clips.saturating_sub(1))
 }
 
 #[cfg(test)]

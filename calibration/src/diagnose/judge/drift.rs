@@ -6,8 +6,8 @@
 
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::fit::bench::Hypothesis;
-use crate::estimate::interval::student;
 use crate::forward::object::Own;
+use crate::statistics::student_sigmas;
 
 /// A slope of so many sigmas of a normal distribution, or as unlikely a one of few clips, is no chance: p = 0.02.
 const NO_CHANCE: f64 = 2.33;
@@ -40,7 +40,7 @@ fn trend(points: &[(f64, f64)]) -> Option<f64> {
     let (slope, degrees) = (xy / xx, count - 2);
     let error = ((yy - slope * xy).max(0.0) / degrees as f64 / xx).sqrt();
     let span = points.last()?.0 - points.first()?.0;
-    (slope.abs() > student(NO_CHANCE, degrees) * error).then_some(slope * span)
+    (slope.abs() > student_sigmas(NO_CHANCE, degrees) * error).then_some(slope * span)
 }
 
 #[cfg(test)]

@@ -6,11 +6,11 @@
 
 use super::held_out::Fits;
 use crate::diagnose::evidence::measured::Evidence;
-use crate::diagnose::evidence::noise::median;
 use crate::diagnose::evidence::scatter_scale::{Around, at_the_best_scale};
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
 use crate::diagnose::fit::left_out::shift_to;
 use crate::diagnose::fit::quadratic::value;
+use crate::statistics::median;
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,7 +116,7 @@ impl Predicted {
     #[must_use]
     pub fn over(&self, other: &Self) -> Advantage {
         let mut gains: Vec<f64> = self.clips.iter().zip(&other.clips).map(|((_, a), (_, b))| 0.5 * (b - a)).collect();
-        let most = (OUTSTANDING * median(&gains.iter().map(|gain| gain.abs()).collect::<Vec<_>>())).max(LEAST);
+        let most = (OUTSTANDING * median(gains.iter().map(|gain| gain.abs())).unwrap_or(0.0)).max(LEAST);
         gains.iter_mut().for_each(|gain| *gain = gain.clamp(-most, most));
         let (nats, error) = sum(&gains);
         let share = gains.iter().filter(|gain| **gain > 0.0).count() as f64 / gains.len() as f64;

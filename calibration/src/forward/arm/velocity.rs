@@ -5,6 +5,7 @@
 
 use super::noise;
 use crate::estimate::plane::{Slope, plane};
+use crate::statistics::median;
 use shared_mem::recording::JointSeries;
 use shared_mem::time::seconds_between;
 
@@ -90,7 +91,7 @@ impl Motion<'_> {
 pub fn late(joints: &[Compared], step: f64) -> Option<Late> {
     let delays: Vec<f64> = joints.iter().map(|c| c.delay.value).collect();
     let interval = delays.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], d| [lo.min(*d), hi.max(*d)]);
-    let delay = middle(delays)?;
+    let delay = median(delays)?;
     let sure = |c: &&Compared| c.delay.value - 2.0 * c.delay.sigma > 0.5 * FILTER_DELAY;
     let most = joints.iter().filter(sure).count() * 3 >= joints.len() * 2;
     (most && delay > FILTER_DELAY.max(FILTER_STEPS * step)).then_some(Late { delay, interval })
@@ -134,12 +135,7 @@ fn seconds(log: &JointSeries) -> Vec<f64> {
 }
 
 fn step(t: &[f64]) -> f64 {
-    middle(t.windows(2).map(|w| w[1] - w[0]).collect()).unwrap_or(0.0)
-}
-
-fn middle(mut values: Vec<f64>) -> Option<f64> {
-    let at = values.len().checked_sub(1)? / 2 + (values.len() - 1) % 2;
-    Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
+    median(t.windows(2).map(|w| w[1] - w[0])).unwrap_or(0.0)
 }
 
 /// One sigma about the mean.

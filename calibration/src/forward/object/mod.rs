@@ -136,11 +136,6 @@ impl ObjectClips {
         self.simulator.as_ref().map(|simulator| &simulator.engine)
     }
 
-    /// The same clips, other numbers to turn.
-    pub fn set_settings(&mut self, settings: Settings) {
-        self.settings = settings;
-    }
-
     /// How far residuals may be off for other reasons than noise.
     pub fn model_error(&self) -> ModelError {
         self.error

@@ -1,6 +1,5 @@
 //! Numbers that every clip with an object has of its own: how its friction, its start, its clock and what its hit left
-//! behind differ from what all clips share. Read by [`super::ObjectClips`]; their scatter is estimated by
-//! [`crate::estimate::scatter`].
+//! behind differ from what all clips share. Read by [`super::ObjectClips`].
 
 use crate::estimate::Random;
 use shared_mem::cell::{Cell, ClipKind};

@@ -2,8 +2,9 @@
 
 use super::model::{Motion, Motions, best_fit};
 use super::noise::Noise;
-use crate::estimate::interval::student_95;
+use crate::estimate::interval::LEVEL;
 use crate::estimate::{ClipFit, Fit, Intervals, Options, Unknown, score};
+use crate::statistics::student;
 
 /// A number is not identifiable if its interval, to either side, is more than this share of what slows the part in all: the other may
 /// as well be what does.
@@ -29,11 +30,11 @@ impl Found {
         // Neither is negative, and one that is found to be 0 is as uncertain as any other.
         let intervals = Intervals::new(&fit, &[false; 2]);
         let wider = (fit.misfit() * noise.lasts()).sqrt();
-        let t = student_95(intervals.witnesses.saturating_sub(1));
+        let t = student(LEVEL, intervals.witnesses.saturating_sub(1));
         let rows: f64 = motions.iter().map(|motion| noise.independent(motion.times.len())).sum();
         // Each motion has a start of two numbers, and all have two in common.
         let free = rows as usize;
-        let of_rows = student_95(free.saturating_sub(2 * motions.len() + 2).max(1));
+        let of_rows = student(LEVEL, free.saturating_sub(2 * motions.len() + 2).max(1));
         let half = std::array::from_fn(|k| {
             let of_noise = of_rows * intervals.model_sigma[k] * wider;
             if intervals.half_width[k].is_finite() {

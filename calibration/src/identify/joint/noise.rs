@@ -1,6 +1,8 @@
 //! How noisy recorded positions of a joint are, from the rows themselves: what changes from row to row, and what changes while the
 //! part rests.
 
+use crate::statistics::median;
+
 /// Rows of a window in which a part may rest.
 const WINDOW: usize = 30;
 /// A window is one of rest if its rows scatter by at most so many times what changes from row to row.
@@ -31,7 +33,7 @@ impl Noise {
     /// Of the positions of several clips.
     pub(super) fn of<'a>(clips: impl Iterator<Item = &'a [f64]> + Clone) -> Self {
         let thirds = clips.clone().flat_map(|rows| rows.windows(4).map(|w| (w[3] - 3.0 * (w[2] - w[1]) - w[0]).abs()));
-        let white = median(thirds.collect()) / MEDIAN / THIRD;
+        let white = median(thirds).unwrap_or(0.0) / MEDIAN / THIRD;
         let windows: Vec<&[f64]> = clips.flat_map(|rows| rows.chunks_exact(WINDOW)).collect();
         let of = |degree: usize| windows.iter().map(move |window| covariances(window, degree)).collect::<Vec<_>>();
         let resting: Vec<[f64; 3]> =
@@ -107,15 +109,6 @@ fn middle(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let cut = values.len() / 4;
     mean(values[cut..values.len() - cut].to_vec())
-}
-
-/// The middle of the values; 0 of none.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Where a joint is over a clip: the pose of its part as seen from the body that carries it.
 
-use super::noise::median;
 use super::subject::Subject;
+use crate::statistics::median;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use shared_mem::recording::{Clip, ObjectSeries};
 use std::f64::consts::{PI, TAU};
@@ -66,7 +66,7 @@ impl Positions {
             let [a, b] = &subject.bodies;
             return Err(format!("has only {} poses of `{b}` while `{a}` is seen, too", positions.len()));
         }
-        let [beside, turned] = [median(beside), median(turned)];
+        let [beside, turned] = [beside, turned].map(|values| median(values).unwrap_or(0.0));
         if beside > BESIDE || turned > TURNED {
             return Err(format!(
                 "shows `{}` {:.0} mm and {:.0} degrees beside its joint; give poses in the frames of the URDF's links",

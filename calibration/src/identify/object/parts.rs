@@ -6,12 +6,13 @@
 use super::ObjectError;
 use super::fit::fit_object;
 use super::polish::let_go;
-use crate::estimate::interval::student_95;
+use crate::estimate::interval::LEVEL;
 use crate::estimate::{ClipModel as _, Unknown};
 use crate::forward::Settings;
 use crate::forward::object::ObjectClips;
 use crate::interrupt::Interrupt;
 use crate::kept::Kept;
+use crate::statistics::student;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
 
@@ -55,7 +56,7 @@ fn half_width(parts: &[f64]) -> f64 {
     let count = parts.len() as f64;
     let mean = parts.iter().sum::<f64>() / count;
     let variance = parts.iter().map(|part| (part - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    student_95(parts.len() - 1) * (variance / count).sqrt()
+    student(LEVEL, parts.len() - 1) * (variance / count).sqrt()
 }
 
 #[cfg(test)]
@@ -67,6 +68,6 @@ mod tests {
         assert_eq!(half_width(&[0.18; 4]), 0.0);
         // Mean 0.2, deviation 0.02 * sqrt(4 / 3).
         let half = half_width(&[0.18, 0.22, 0.18, 0.22]);
-        assert!((half - student_95(3) * 0.02 * (4.0_f64 / 3.0).sqrt() / 2.0).abs() < 1e-12, "{half}");
+        assert!((half - student(LEVEL, 3) * 0.02 * (4.0_f64 / 3.0).sqrt() / 2.0).abs() < 1e-12, "{half}");
     }
 }

@@ -201,7 +201,7 @@ impl Question<'_> {
             let model = OneClip { clips: self.clips, clip, shared };
             let fit = fit_from(&model, &[], self.random, (Vec::new(), vec![own.clone()]), &OWN, |_, _| true)?;
             let [clip] = &fit.clips[..] else { return Err(Impossible("no clip".into())) };
-            Ok((clip.own.clone(), clip.chi2 + penalty(self.random, &clip.own), fit.evaluations))
+            Ok((clip.own.clone(), clip.chi2 + Random::penalty(self.random, &clip.own), fit.evaluations))
         };
         own.par_iter().enumerate().map(one).collect()
     }
@@ -220,10 +220,6 @@ impl Question<'_> {
 
 fn weighted(clips: &[Profiled], weights: &[f64]) -> f64 {
     clips.iter().zip(weights).map(|((_, cost, _), weight)| cost * weight).sum()
-}
-
-fn penalty(random: &[Random], own: &[f64]) -> f64 {
-    random.iter().zip(own).filter(|(effect, _)| effect.sigma > 0.0).map(|(effect, u)| (u / effect.sigma).powi(2)).sum()
 }
 
 /// 1 for clips whose misfit is usual, in inverse proportion to it beyond.
