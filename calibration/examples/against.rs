@@ -9,8 +9,8 @@
 
 use calibration::benchmark::pairs::{CHANGES, Changed, Outcome};
 use calibration::benchmark::world::Kind;
-use calibration::interrupt::Interrupt;
 use clap::{Parser, ValueEnum};
+use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::{input, output};
 use std::path::PathBuf;

@@ -9,8 +9,8 @@
 
 use calibration::benchmark::coverage::{Session, Subject, table};
 use calibration::benchmark::world::Kind;
-use calibration::interrupt::Interrupt;
 use clap::{Parser, ValueEnum};
+use inference::interrupt::Interrupt;
 use serde::{Deserialize, Serialize};
 use shared_mem::cell::Cell;
 use shared_mem::{console, input, output};

@@ -5,13 +5,13 @@
 
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 
-use calibration::hand_eye::fit::fit;
-use calibration::hand_eye::simulated::{World, off};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use shared_mem::hand_eye::Mount;
+use vision::hand_eye::fit::fit;
+use vision::hand_eye::simulated::{World, off};
 
 /// What came of one seed.
 struct Outcome {

@@ -8,8 +8,8 @@
 use calibration::benchmark::session::record;
 use calibration::benchmark::trial::examine;
 use calibration::benchmark::world::{Fault, Kind, World};
-use calibration::interrupt::Interrupt;
 use clap::Parser;
+use inference::interrupt::Interrupt;
 use shared_mem::cell::{Cell, Controller, ControllerKind};
 use shared_mem::console;
 use std::path::PathBuf;

@@ -11,16 +11,6 @@
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 
 use calibration::benchmark::coverage::{Printed, Session, table};
-use calibration::viewpoint::fit::{Method, fit};
-use calibration::viewpoint::frame::{Evidence, Frame};
-use calibration::viewpoint::grid::Grid;
-use calibration::viewpoint::interval::interval;
-use calibration::viewpoint::lens::Lens;
-use calibration::viewpoint::picture::Pixels;
-use calibration::viewpoint::refine::{self, refine};
-use calibration::viewpoint::search::Reach;
-use calibration::viewpoint::shape::Shape;
-use calibration::viewpoint::step;
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::StandardNormal;
@@ -31,6 +21,16 @@ use std::time::Instant;
 use twin::render::{Hand, RobotSurface};
 use twin::scene::SceneSnapshot;
 use twin::sensors::camera::SimCamera;
+use vision::viewpoint::fit::{Method, fit};
+use vision::viewpoint::frame::{Evidence, Frame};
+use vision::viewpoint::grid::Grid;
+use vision::viewpoint::interval::interval;
+use vision::viewpoint::lens::Lens;
+use vision::viewpoint::picture::Pixels;
+use vision::viewpoint::refine::{self, refine};
+use vision::viewpoint::search::Reach;
+use vision::viewpoint::shape::Shape;
+use vision::viewpoint::step;
 
 /// Starts lie within this of the truth [rad, m].
 const REACH: Reach = Reach { angle: 0.349, distance: 0.3 };

@@ -1,7 +1,7 @@
 //! Keys of the terminal while the arm moves: single ones, without Enter. Nothing is read where standard input is no
 //! terminal, or another program is in front of it.
 
-use crate::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use rustix::process::getpgrp;
 use rustix::termios::{
     LocalModes, OptionalActions, SpecialCodeIndex, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr,

@@ -1,8 +1,5 @@
 //! `calibration hand-eye` as a program: lists of corners in, hand_eye.toml out; what cannot be used is refused in one line.
 
-use calibration::hand_eye::chain::Chain;
-use calibration::hand_eye::simulated::{World, off};
-use calibration::hand_eye::view::View;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use serde_json::{Value, json};
@@ -10,6 +7,9 @@ use shared_mem::hand_eye::{HandEye, Mount};
 use shared_mem::lens::Distortion;
 use std::path::Path;
 use std::process::{Command, Output};
+use vision::hand_eye::chain::Chain;
+use vision::hand_eye::simulated::{World, off};
+use vision::hand_eye::view::View;
 
 const WORLD: World =
     World { mount: Mount::EyeInHand, views: 12, pixel: 0.1, arm: [1e-3, 0.5e-3], turns: [0.5, 0.5, 1.0] };

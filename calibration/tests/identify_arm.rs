@@ -5,7 +5,7 @@ mod arm_session;
 use arm_session::{cell, clips, hidden};
 use calibration::identify::arm::{Options, identify_clips};
 use calibration::identify::{Identification, Optimizer};
-use calibration::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::ArmTheta;

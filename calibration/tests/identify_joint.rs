@@ -1,7 +1,7 @@
 //! Pushes of a laptop's lid as clips of poses: what is found of its hinge, and what is said where there is nothing to find.
 
 use calibration::identify::{Identification, joint};
-use calibration::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::StandardNormal;

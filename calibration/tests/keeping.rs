@@ -4,7 +4,7 @@ mod arm_session;
 
 use arm_session::{cell, clips, hidden};
 use calibration::diagnose::{Diagnosis, Options, diagnose, diagnose_kept};
-use calibration::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::joints_from;

@@ -5,7 +5,7 @@ use calibration::benchmark::world::{Fault, Kind as Motion, World};
 use calibration::diagnose::clips::admit::Admitted;
 use calibration::diagnose::clips::length::liveliest;
 use calibration::diagnose::{Kind, Options, diagnose_clips};
-use calibration::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::recording::{Clip, JointSeries, Session, SessionFiles};
 use shared_mem::theta::{EffectTheta, Theta};

@@ -3,13 +3,13 @@
 use calibration::benchmark::coverage::Subject;
 use calibration::benchmark::session::record;
 use calibration::benchmark::world::{Fault, Kind, World};
-use calibration::estimate::ClipModel as _;
-use calibration::forward::Settings;
-use calibration::forward::object::{ModelError, ObjectClips, Own};
-use calibration::forward::setting::{complete, object_parameters};
 use calibration::identify::object::{Options, identify, identify_clips};
 use calibration::identify::{Identification, Optimizer};
-use calibration::interrupt::Interrupt;
+use inference::estimate::ClipModel as _;
+use inference::forward::Settings;
+use inference::forward::object::{ModelError, ObjectClips, Own};
+use inference::forward::setting::{complete, object_parameters};
+use inference::interrupt::Interrupt;
 use std::path::{Path, PathBuf};
 
 fn world(number: u64) -> World {
@@ -64,8 +64,8 @@ fn a_place_left_by_the_hit_moves_the_resting_place_by_as_much() {
     let world = world(3);
     let (mut clips, truth) = (strokes(&world, 1), truth(&world));
     clips.set_model_error(ModelError::default());
-    let along_x = Own::Release(calibration::forward::object::Axis::X);
-    let along_x = calibration::forward::object::ALL.iter().position(|own| *own == along_x).expect("listed");
+    let along_x = Own::Release(inference::forward::object::Axis::X);
+    let along_x = inference::forward::object::ALL.iter().position(|own| *own == along_x).expect("listed");
     let ends = |own: &[f64]| {
         let poses = clips.predict(0, &truth, own).expect("an answer").poses;
         [poses.first(), poses.last()].map(|pose| pose.expect("a pose").position()[0])
@@ -73,7 +73,7 @@ fn a_place_left_by_the_hit_moves_the_resting_place_by_as_much() {
     let [start, plain] = ends(&[]);
     // Away from the tool: into it, the tool would have the last word.
     let shift = 0.002 * (plain - start).signum();
-    let mut own = vec![0.0; calibration::forward::object::ALL.len()];
+    let mut own = vec![0.0; inference::forward::object::ALL.len()];
     own[along_x] = shift;
     let [_, moved] = ends(&own);
     assert!((moved - plain - shift).abs() < 1e-3, "{plain} {moved}");

@@ -3,7 +3,7 @@
 mod slides;
 
 use calibration::diagnose::{Diagnosis, Kind, Options, diagnose_clips};
-use calibration::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 
 fn diagnosed(hidden: &str) -> Diagnosis {
     let (session, admitted) = slides::session(hidden);

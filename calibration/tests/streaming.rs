@@ -2,12 +2,12 @@
 
 mod fake_bridge;
 
-use calibration::capture::link::{Link, LinkError};
-use calibration::capture::plan::Plan;
-use calibration::capture::recovery::Recovery;
-use calibration::capture::stream::{Motion, Outcome, StreamError, play};
-use calibration::interrupt::Interrupt;
+use capture::link::{Link, LinkError};
+use capture::plan::Plan;
+use capture::recovery::Recovery;
+use capture::stream::{Motion, Outcome, StreamError, play};
 use fake_bridge::{FakeBridge, Fault};
+use inference::interrupt::Interrupt;
 use shared_mem::msg::arm::ArmMode;
 use shared_mem::msg::joints_from;
 use shared_mem::msg::motion::SetPoint;

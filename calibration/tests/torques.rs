@@ -3,8 +3,8 @@
 mod driven;
 
 use calibration::diagnose::{Diagnosis, Options, diagnose};
-use calibration::interrupt::Interrupt;
 use driven::Driven;
+use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::Session;

@@ -6,7 +6,7 @@ use calibration::benchmark::world::{Fault, Kind as Motion, World};
 use calibration::diagnose::clips::admit::Admitted;
 use calibration::diagnose::{Diagnosis, Kind, Options, diagnose_clips};
 use calibration::identify::arm;
-use calibration::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::recording::{Session, SessionFiles};
 use shared_mem::theta::Theta;

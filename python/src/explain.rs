@@ -3,9 +3,9 @@
 use crate::failed;
 use calibration::check::gate::{self, Allowed};
 use calibration::diagnose::{Options, diagnose as diagnosed};
-use calibration::engine::{Call, Engine};
+use inference::engine::{Call, Engine};
 use calibration::identify::{Identification, Optimizer, arm, object};
-use calibration::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use shared_mem::recording::{Provenance, Session};

@@ -109,7 +109,7 @@ pub fn documents() -> Vec<(String, String)> {
 }
 
 /// The folders with the sources of the product.
-pub const PRODUCT: [&str; 11] = [
+pub const PRODUCT: [&str; 14] = [
     "shared_mem/src",
     "twin/splat/src",
     "twin/fusion/src",
@@ -120,6 +120,9 @@ pub const PRODUCT: [&str; 11] = [
     "rt_bridge/src",
     "shared_mem/import/src",
     "calibration/evaluation/src",
+    "calibration/inference/src",
+    "calibration/vision/src",
+    "calibration/capture/src",
     "calibration/src",
 ];
 

@@ -70,14 +70,14 @@ fn each_big_dependency_has_one_door() {
         ("realsense_rust", &["rt_bridge/src/camera/realsense/stream.rs"]),
         ("wgpu", &["twin/src/render/device/"]),
         ("rstar", &["twin/src/reconstruct/nearest.rs"]),
-        ("chess_corners", &["calibration/src/viewpoint/board.rs"]),
+        ("chess_corners", &["calibration/vision/src/viewpoint/board.rs"]),
         ("clap_complete", &["shared_mem/src/command_line/"]),
         ("clap_mangen", &["shared_mem/src/command_line/"]),
         // Whatever asks for the commit is built again after each.
         ("git_version", &["twin/src/main.rs", "rt_bridge/src/main.rs", "calibration/src/main.rs"]),
         (
             "rsruckig",
-            &["twin/src/arm/follower.rs", "rt_bridge/src/motion/brake.rs", "calibration/src/capture/transit.rs"],
+            &["twin/src/arm/follower.rs", "rt_bridge/src/motion/brake.rs", "calibration/capture/src/transit.rs"],
         ),
         ("parquet", &["shared_mem/import/src/sources/parquet_file.rs", "shared_mem/import/src/data_set/table.rs"]),
         ("rusqlite", &["shared_mem/import/src/sources/sqlite.rs"]),
@@ -86,7 +86,7 @@ fn each_big_dependency_has_one_door() {
         ("lz4_flex", &["shared_mem/src/input/packing.rs"]),
         ("zstd", &["shared_mem/src/input/packing.rs"]),
         ("csv", &["shared_mem/import/src/sources/table/cells.rs", "calibration/evaluation/src/trial.rs"]),
-        ("statrs", &["calibration/evaluation/src/statistics/", "calibration/src/statistics.rs"]),
+        ("statrs", &["calibration/evaluation/src/statistics/", "calibration/inference/src/statistics.rs"]),
         ("rmpv", &["calibration/evaluation/src/policy/"]),
         ("tungstenite", &["calibration/evaluation/src/policy/served.rs"]),
         ("ort", &["calibration/evaluation/src/policy/onnx.rs", "calibration/evaluation/src/policy/onnx/"]),
@@ -212,7 +212,8 @@ fn what_identifies_and_diagnoses_names_no_effect() {
     };
     let effects: Vec<String> = sources("twin/src/effects").into_iter().filter_map(of).collect();
     assert!(effects.len() > 30, "{effects:?}");
-    let folders = ["check", "diagnose", "estimate", "forward", "identify"].map(|f| format!("calibration/src/{f}/"));
+    let folders = ["src/check/", "src/diagnose/", "src/identify/", "inference/src/"]
+        .map(|folder| format!("calibration/{folder}"));
     for (file, text) in product_sources().into_iter().filter(|(file, _)| folders.iter().any(|f| file.starts_with(f))) {
         let is_test = file.contains("test_") || file.contains("/injected/");
         let product = text.split("#[cfg(test)]").next().unwrap_or("").lines();
@@ -261,7 +262,7 @@ fn the_diagnosis_goes_one_way() {
 
 #[test]
 fn dependencies_point_one_way() {
-    let rules: [(&str, &[&str]); 10] = [
+    let rules: [(&str, &[&str]); 13] = [
         (
             "shared_mem",
             &["splat", "fusion", "twin", "link", "rt_bridge", "calibration", "evaluation", "import", "reconstruct"],
@@ -280,6 +281,9 @@ fn dependencies_point_one_way() {
         ("calibration/evaluation", &["rt_bridge", "calibration", "import"]),
         ("twin", &["rt_bridge", "calibration", "evaluation", "import"]),
         ("rt_bridge", &["calibration", "evaluation", "import", "reconstruct"]),
+        ("calibration/inference", &["rt_bridge", "calibration", "evaluation", "import", "vision"]),
+        ("calibration/capture", &["rt_bridge", "calibration", "evaluation", "import", "vision"]),
+        ("calibration/vision", &["capture", "rt_bridge", "calibration", "evaluation", "import"]),
         ("calibration", &["rt_bridge"]),
     ];
     for (package, forbidden) in rules {
@@ -308,6 +312,9 @@ fn the_readme_names_every_folder_and_only_existing_files() {
         "rt_bridge/",
         "rt_bridge/link/",
         "calibration/",
+        "calibration/inference/",
+        "calibration/vision/",
+        "calibration/capture/",
         "calibration/evaluation/",
         "tests/",
         "fuzz/",

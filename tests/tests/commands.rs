@@ -34,10 +34,10 @@ const OF_OTHERS: [&str; 11] = [
 const SPOKEN_BY: [(&str, &[&str]); 13] = [
     ("calibration/src/init/", &["calibration init"]),
     ("shared_mem/import/src/", &["calibration import"]),
-    ("calibration/src/viewpoint/", &["calibration viewpoint"]),
-    ("calibration/src/hand_eye/", &["calibration hand-eye"]),
+    ("calibration/vision/src/viewpoint/", &["calibration viewpoint"]),
+    ("calibration/vision/src/hand_eye/", &["calibration hand-eye"]),
     (
-        "calibration/src/capture/",
+        "calibration/capture/src/",
         &["calibration capture excitation", "calibration capture control-hit-slide", "calibration capture scan"],
     ),
     ("calibration/src/demo/", &["calibration demo"]),

@@ -1,9 +1,9 @@
 //! One episode of a policy on a robot: until the horizon, a fault, or the end is asked for.
 
 use super::stream::{Leg, Stream};
-use crate::interrupt::Interrupt;
 use evaluation::policy::{Policy, PolicyError, Seen};
 use evaluation::rollout::Asking;
+use inference::interrupt::Interrupt;
 use serde::Serialize;
 use shared_mem::msg::arm::{ArmMode, ArmState, MotionStatus};
 use shared_mem::msg::check::LARGEST;

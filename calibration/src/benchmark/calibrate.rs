@@ -3,8 +3,8 @@
 
 use crate::diagnose::criteria::{self, Criterion};
 use crate::diagnose::{SensorGap, Sensors};
-use crate::statistics::student_sigmas;
 use anyhow::Context;
+use inference::statistics::student_sigmas;
 use serde::{Deserialize, Serialize};
 use shared_mem::input;
 use std::path::Path;

@@ -8,7 +8,7 @@ use super::trial::sealed;
 use super::world::{Fault, Kind, World};
 use crate::diagnose::against::{Comparison, Pair, compare_clips};
 use crate::diagnose::{self, Options, Status};
-use crate::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@ use super::rules;
 use super::score::Method;
 use super::world::{Fault, Kind, Outside, World};
 use super::{draw, session, trial};
-use crate::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::console;
 use shared_mem::progress::Progress;

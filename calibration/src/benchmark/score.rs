@@ -1,7 +1,7 @@
 //! Scores of a diagnosis over many worlds: how often it was right, false, silent, and whether its confidence was earned.
 //! Rates come with exact (Clopper-Pearson) 95 % intervals.
 
-use crate::statistics;
+use inference::statistics;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -3,12 +3,12 @@
 //! Excitations and strokes are drawn from the world's number, so no two worlds see the same motion.
 
 use super::world::{Kind, Outside, World};
-use crate::capture::body::Body;
-use crate::capture::limits;
-use crate::capture::plan;
-use crate::capture::program::{Program, SPEEDS, Standing, Wish};
-use crate::capture::request::{self, Request};
-use crate::capture::stroke;
+use capture::body::Body;
+use capture::limits;
+use capture::plan;
+use capture::program::{Program, SPEEDS, Standing, Wish};
+use capture::request::{self, Request};
+use capture::stroke;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution as _, StandardNormal};
@@ -311,7 +311,7 @@ mod tests {
     use super::*;
     use crate::diagnose::evidence::arm_clips::ArmClips;
     use crate::diagnose::evidence::measured::Measured;
-    use crate::estimate::ClipModel;
+    use inference::estimate::ClipModel;
     use shared_mem::cell::Cell;
     use std::path::Path;
 

@@ -2,10 +2,10 @@
 
 use super::remark::{Remark, Severity};
 use crate::diagnose::clips::admit;
-use crate::forward::arm::{ArmClips, Channel};
 use crate::identify::arm::ArmError;
 use crate::identify::object::{ObjectError, shows_object};
 use crate::identify::remarks::grouped;
+use inference::forward::arm::{ArmClips, Channel};
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::recording::{Clip, PictureKind, ReadError, Session, for_pictures};

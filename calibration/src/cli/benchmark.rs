@@ -4,9 +4,9 @@ use super::print;
 use calibration::benchmark::calibrate;
 use calibration::benchmark::run::{Extent, Outcome, Plan, run as judge};
 use calibration::benchmark::score::Scores;
-use calibration::interrupt::Interrupt;
 use calibration::report::benchmark::page;
 use calibration::report::terminal;
+use inference::interrupt::Interrupt;
 use serde_json::json;
 use shared_mem::cell::Cell;
 use shared_mem::console;
@@ -51,7 +51,7 @@ pub(super) struct BenchmarkArguments {
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(4..=64))]
     clips: u64,
     /// Number of the first world.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = inference::seed::parse)]
     seed: u64,
     /// Where the page goes.
     #[arg(long, value_name = "REPORT.HTML")]

@@ -1,13 +1,13 @@
 //! `calibration capture`.
 
 use super::print;
-use calibration::capture::control_hit_slide::Series;
-use calibration::capture::request::Kind;
-use calibration::capture::task::Task;
-use calibration::capture::{control_hit_slide, excitation, ramp, scan};
-use calibration::interrupt::Interrupt;
 use calibration::keys::Keys;
+use capture::control_hit_slide::Series;
+use capture::request::Kind;
+use capture::task::Task;
+use capture::{control_hit_slide, excitation, ramp, scan};
 use clap::{Subcommand, ValueEnum as _};
+use inference::interrupt::Interrupt;
 use shared_mem::origin::Origin;
 use shared_mem::output::Destination;
 use shared_mem::quantity::{number, numbers};

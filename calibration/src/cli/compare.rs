@@ -2,7 +2,7 @@
 
 use super::print;
 use calibration::identify::object::{self, compare};
-use calibration::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use shared_mem::output;
 use std::path::PathBuf;
 
@@ -30,7 +30,7 @@ pub(super) struct CompareArguments {
     #[arg(long, value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
     /// Draws the strokes that are held out, and the searches.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = inference::seed::parse)]
     seed: u64,
     /// Where the answer goes, as JSON.
     #[arg(long, value_name = "COMPARISON.JSON")]

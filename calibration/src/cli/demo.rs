@@ -2,7 +2,7 @@
 
 use super::print;
 use calibration::demo;
-use calibration::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -22,7 +22,7 @@ pub(super) struct DemoArguments {
     #[arg(long)]
     force: bool,
     /// Draws the hidden gains, the hidden effect and the motions.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = inference::seed::parse)]
     seed: u64,
     /// Clips to record; a diagnosis needs at least four.
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(4..=100))]

@@ -4,8 +4,8 @@ use super::engine::{EngineArguments, heard};
 use calibration::check::gate::{self, Allowed};
 use calibration::diagnose::conclude::written;
 use calibration::diagnose::{Diagnosis, Options, diagnose_kept};
-use calibration::interrupt::Interrupt;
 use calibration::report;
+use inference::interrupt::Interrupt;
 use shared_mem::console;
 use shared_mem::output::Destination;
 use shared_mem::recording::Session;
@@ -105,7 +105,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     pub(super) engine: EngineArguments,
     /// Draws which clips are for what, and the intervals.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = inference::seed::parse)]
     pub(super) seed: u64,
     /// Prints one JSON object on stdout at the end.
     #[arg(long)]

@@ -1,7 +1,7 @@
 //! `--engine`: roll-outs by another program.
 
-use calibration::engine::{Call, Engine};
-use calibration::interrupt::Interrupt;
+use inference::engine::{Call, Engine};
+use inference::interrupt::Interrupt;
 use shared_mem::recording::Session;
 use std::sync::Arc;
 use std::time::Duration;

@@ -2,8 +2,6 @@
 
 use super::print;
 use anyhow::{Context as _, bail};
-use calibration::interrupt::Interrupt;
-use calibration::kept::{Fingerprint, for_work};
 use calibration::report::evaluation::{self as report, Sheet};
 use calibration::study::{self, Plan, World};
 use clap::{Args, ValueEnum};
@@ -11,6 +9,8 @@ use evaluation::findings::findings;
 use evaluation::policy::{ActionKind, Keys, Named};
 use evaluation::rollout::Asking;
 use evaluation::trial::{self, Trial};
+use inference::interrupt::Interrupt;
+use inference::kept::{Fingerprint, for_work};
 use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::console;
@@ -64,7 +64,7 @@ pub(super) struct EvaluateArguments {
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     episodes: u64,
     /// The first start; the others follow it.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = inference::seed::parse)]
     seed: u64,
     #[command(flatten)]
     asking: AskingArguments,

@@ -2,14 +2,14 @@
 
 use super::print;
 use anyhow::bail;
-use calibration::hand_eye::command::{Options, run as find};
-use calibration::hand_eye::input::Source;
-use calibration::viewpoint::board::Board;
 use clap::Args;
 use shared_mem::hand_eye::Mount;
 use shared_mem::output::Destination;
 use shared_mem::quantity;
 use std::path::PathBuf;
+use vision::hand_eye::command::{Options, run as find};
+use vision::hand_eye::input::Source;
+use vision::viewpoint::board::Board;
 
 #[derive(Debug, Args)]
 #[command(after_help = "\

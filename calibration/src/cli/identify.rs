@@ -4,9 +4,9 @@ use super::engine::{EngineArguments, heard};
 use super::print;
 use calibration::check::gate::{self, Allowed};
 use calibration::identify::{Identification, Optimizer, arm, joint, object};
-use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Subcommand, ValueEnum};
+use inference::interrupt::Interrupt;
 use shared_mem::output::Destination;
 use shared_mem::recording::{Provenance, Session};
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ struct Task {
     #[arg(long, value_name = "THETA.TOML")]
     parameters: Option<PathBuf>,
     /// Draws the clips that are held out, and the searches.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = inference::seed::parse)]
     seed: u64,
     /// Takes the data as they were recorded where `calibration check` says that they cannot mean what they say.
     #[arg(long)]

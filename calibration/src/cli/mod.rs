@@ -20,9 +20,9 @@ mod policy;
 mod sweep;
 mod viewpoint;
 
-use calibration::interrupt::Interrupt;
 use calibration::report::terminal;
 use clap::{Parser, Subcommand};
+use inference::interrupt::Interrupt;
 use serde::Serialize;
 use shared_mem::answer;
 use shared_mem::ending;

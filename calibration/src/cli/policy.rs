@@ -4,12 +4,12 @@ use super::evaluate::AskingArguments;
 use super::print;
 use anyhow::{Context as _, bail};
 use calibration::acting::Robot;
-use calibration::capture::recorder::Recorder;
-use calibration::interrupt::Interrupt;
+use capture::recorder::Recorder;
 use clap::{Args, Subcommand};
 use evaluation::policy::{Named, Policy as Asked, Source};
 use evaluation::rollout::{self, Asking, Outcome, RunError};
 use evaluation::statistics::Share;
+use inference::interrupt::Interrupt;
 use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::origin::Origin;
@@ -58,7 +58,7 @@ pub(super) struct RunArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     episodes: u64,
     /// The first start; the others follow it.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = calibration::seed::parse)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = inference::seed::parse)]
     seed: u64,
     /// The cell whose arm carries the task out [default: the arm is where it is commanded to be].
     #[arg(long, value_name = "CELL.TOML")]

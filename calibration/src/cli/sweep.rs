@@ -2,9 +2,9 @@
 
 use super::print;
 use anyhow::Context as _;
-use calibration::interrupt::Interrupt;
 use calibration::sweep::{self, Each, Partition, Ran, Slice, TimeLimit, Wanted};
 use clap::{Args, Subcommand};
+use inference::interrupt::Interrupt;
 use serde_json::json;
 use shared_mem::answer;
 use shared_mem::input;

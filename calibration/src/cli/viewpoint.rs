@@ -1,17 +1,17 @@
 //! `calibration viewpoint`.
 
 use super::print;
-use calibration::viewpoint::answer::Viewpoint;
-use calibration::viewpoint::board::Board;
-use calibration::viewpoint::command::{Options, StartFrom, run as find};
-use calibration::viewpoint::fit::Method;
-use calibration::viewpoint::search::Reach;
 use clap::{Args, ValueEnum};
 use shared_mem::output::Destination;
 use shared_mem::quantity::{self, number};
 use shared_mem::recording::PictureKind;
 use std::path::PathBuf;
 use twin::render::Hand;
+use vision::viewpoint::answer::Viewpoint;
+use vision::viewpoint::board::Board;
+use vision::viewpoint::command::{Options, StartFrom, run as find};
+use vision::viewpoint::fit::Method;
+use vision::viewpoint::search::Reach;
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -74,7 +74,7 @@ pub(crate) struct ViewpointArguments {
     #[arg(long, value_name = "WIDTH", value_parser = |text: &str| number(text, 0.0..=0.08, "m"))]
     hand: Option<f64>,
     /// Seed of what is drawn by lot.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = calibration::seed::parse)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = inference::seed::parse)]
     seed: u64,
     /// Writes the cell with the pose found.
     #[arg(long, value_name = "CELL.TOML")]

@@ -1,8 +1,8 @@
 //! The offline half of the demo: `twin replay` under the laboratory's gains and under the true ones, and the traces to show.
 
-use crate::interrupt::Interrupt;
-use crate::processes::{Program, Running, arguments};
 use anyhow::{Context as _, ensure};
+use capture::processes::{Program, Running, arguments};
+use inference::interrupt::Interrupt;
 use serde::Deserialize;
 use shared_mem::recording::{ClipMessages, Payload};
 use shared_mem::time::seconds_between;

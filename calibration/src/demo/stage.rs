@@ -1,8 +1,8 @@
 //! The live half of the demo: bridge and twin as two processes that meet in a private corner of shared memory.
 
-use crate::interrupt::Interrupt;
-use crate::processes::{Program, Running, arguments};
 use anyhow::{Context as _, bail};
+use capture::processes::{Program, Running, arguments};
+use inference::interrupt::Interrupt;
 use serde_json::Value;
 use shared_mem::msg::twin::TwinGap;
 use shared_mem::topics::TWIN_GAP;
@@ -66,7 +66,7 @@ impl Stage {
     /// An error with last words when one of the two has ended by itself.
     ///
     /// # Errors
-    /// [`crate::processes::ProcessError::Ended`].
+    /// [`capture::processes::ProcessError::Ended`].
     pub(super) fn check(&mut self) -> anyhow::Result<()> {
         self.bridge.check()?;
         Ok(self.twin.check()?)

@@ -1,9 +1,9 @@
 //! The answer of a diagnosis, as it is written to diagnosis.json and shown on the page.
 
-use crate::capture::arm_motion::ArmMotion;
-use crate::capture::rate::RATE;
-use crate::engine::Used;
 use crate::page::{Size, Trace};
+use capture::arm_motion::ArmMotion;
+use capture::rate::RATE;
+use inference::engine::Used;
 use shared_mem::recording::SessionFiles;
 use shared_mem::theta::Theta;
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! How far gains may be off that cell.toml states by value.
 
-use crate::estimate::Unknown;
+use inference::estimate::Unknown;
 use shared_mem::cell::Cell;
 
 /// How far gains stated by value may be off: cell.toml's own statement, and a quarter more.

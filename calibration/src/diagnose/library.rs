@@ -7,8 +7,8 @@
 
 use crate::diagnose::clips::ground::{Ground, Patch};
 use crate::diagnose::known_gains;
-use crate::estimate::Unknown;
-use crate::forward::setting::{self, Setting, Settings};
+use inference::estimate::Unknown;
+use inference::forward::setting::{self, Setting, Settings};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use std::ops::Range;

@@ -41,17 +41,17 @@ pub use answer::{
     Sensors, Share, StageTest, Status, TorqueRms, Verdict,
 };
 
-use crate::engine::{Engine, EngineError, Quantity, Used};
-use crate::forward::object::ObjectClips;
-use crate::forward::setting::{self, BaseError};
 use crate::identify::arm::{self, ArmError};
-use crate::interrupt::Interrupt;
-use crate::kept::{self, Fingerprint, Kept, Trail};
 use clips::admit::{Admitted, Refused, admit};
 use evidence::arm_clips::ArmClips;
 use evidence::cell_clips::CellClips;
 use evidence::measured::Evidence;
 use fit::bench::Bench;
+use inference::engine::{Engine, EngineError, Quantity, Used};
+use inference::forward::object::ObjectClips;
+use inference::forward::setting::{self, BaseError};
+use inference::interrupt::Interrupt;
+use inference::kept::{self, Fingerprint, Kept, Trail};
 use library::Library;
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;

@@ -1,8 +1,8 @@
 //! What an identification found: one structure for the JSON answer, the page and the terminal. SI units.
 
 use super::sheet::{Clip as SheetClip, Error as SheetError, Parameter as SheetParameter, Sheet};
-use crate::engine::Used;
 use crate::page::{Trace, number_in_words};
+use inference::engine::Used;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
 use shared_mem::recording::SessionFiles;

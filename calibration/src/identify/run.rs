@@ -2,13 +2,13 @@
 //! ([`Kept`]), and the same command goes on from there to the same answer.
 
 use super::answer::Identification;
-use crate::estimate::search;
-use crate::estimate::{
+use inference::estimate::search;
+use inference::estimate::{
     ClipModel, Evolution, Fit, Found, Impossible, Options, Random, Search, Swarm, Underway, Unknown, begin, fit_from,
     go_on, minimise,
 };
-use crate::interrupt::Interrupt;
-use crate::kept::{Fingerprint, Kept};
+use inference::interrupt::Interrupt;
+use inference::kept::{Fingerprint, Kept};
 use shared_mem::output::OutputError;
 use shared_mem::progress::Progress;
 use shared_mem::theta::Theta;

@@ -316,13 +316,13 @@ pub fn words(found: &Findings, out: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interrupt::Interrupt;
-    use crate::kept::Kept;
     use crate::study::{World, run};
     use evaluation::findings::findings;
     use evaluation::policy::{ActionKind, Keys};
     use evaluation::rollout::Asking;
     use evaluation::trial::Trial;
+    use inference::interrupt::Interrupt;
+    use inference::kept::Kept;
     use std::sync::Arc;
     use twin::task::Task;
 

@@ -1,10 +1,10 @@
 //! An evaluation: every policy on every task from the same starts in every world, kept trial by trial.
 
-use crate::interrupt::Interrupt;
-use crate::kept::{Fingerprint, Kept};
 use evaluation::policy::{Named, Policy, Source};
 use evaluation::rollout::{self, Asking, Outcome, RunError};
 use evaluation::trial::Trial;
+use inference::interrupt::Interrupt;
+use inference::kept::{Fingerprint, Kept};
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 use shared_mem::input;

@@ -5,7 +5,7 @@
 //! nowhere counts by what is written in it.
 
 use super::SweepError;
-use crate::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use sha2::{Digest as _, Sha256};
 use shared_mem::command_line;
 use shared_mem::input::{self, InputError};

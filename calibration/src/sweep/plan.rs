@@ -3,7 +3,7 @@
 use super::SweepError;
 use super::inputs::Inputs;
 use super::unit::{OUT, UNITS, Unit};
-use crate::interrupt::Interrupt;
+use inference::interrupt::Interrupt;
 use shared_mem::output::OutputFolder;
 use std::collections::BTreeSet;
 use std::path::Path;

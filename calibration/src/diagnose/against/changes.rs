@@ -12,7 +12,7 @@ use super::turned::{Acts, Side, Turned};
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::quadratic::minimum;
 use crate::page::UNBOUNDED;
-use crate::statistics::student_sigmas;
+use inference::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 

@@ -19,7 +19,7 @@ use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::localise;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes::Sizes;
-use crate::forward::Setting;
+use inference::forward::Setting;
 use shared_mem::recording::Session;
 use std::collections::BTreeMap;
 

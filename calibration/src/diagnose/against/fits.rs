@@ -9,7 +9,7 @@ use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out;
 use crate::diagnose::judge::score::{Predicted, predict};
 use crate::diagnose::judge::trial::NEARLY_ALL;
-use crate::statistics::{median, student_sigmas};
+use inference::statistics::{median, student_sigmas};
 
 /// What all fits share.
 pub(super) struct PairBench<'a, E> {

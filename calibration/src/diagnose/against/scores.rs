@@ -14,7 +14,7 @@ use crate::diagnose::fit::floor;
 use crate::diagnose::fit::quadratic::{bounded_minimum, eliminate, minimum};
 use crate::diagnose::fit::shortlist::{Scored, chance};
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
-use crate::statistics::student_sigmas;
+use inference::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 
 /// A change as the slopes have it.

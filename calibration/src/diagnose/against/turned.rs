@@ -6,8 +6,8 @@
 use super::super::library::Library;
 use crate::diagnose::evidence::measured::{Channel, Evidence, Measured, Near, Row};
 use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
-use crate::estimate::{ClipModel, Impossible, Unknown};
-use crate::forward::Setting;
+use inference::estimate::{ClipModel, Impossible, Unknown};
+use inference::forward::Setting;
 
 /// One of the two sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,9 +3,9 @@
 use super::ground::Ground;
 use super::torques::{self, is_tracking};
 use super::{length, split};
-use crate::forward::arm::one_piece;
 use crate::identify::object::screen::{Screened, screened};
 use crate::identify::remarks::grouped;
+use inference::forward::arm::one_piece;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, JointSeries, ReadError, Session};
 use twin::arm::{ArmModel, ModelError};

@@ -3,7 +3,7 @@
 //! Clips of the same command stay together: what was fitted on one would be known on the other. Of few commands none can be
 //! spared: a draw of two for fitting would decide the answer. There every command is left out in turn.
 
-use crate::capture::recorded;
+use capture::recorded;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::recording::Clip;
 

@@ -5,7 +5,7 @@
 //! ([`ControllerKind::Tracking`]), and this torque is held against the measured one. Effects on the way of a command do not show;
 //! friction, payloads, base tilts and the like do, gains and delays or not.
 
-use crate::forward::smoothing;
+use inference::forward::smoothing;
 use shared_mem::cell::{Cell, Controller, ControllerKind, Robot};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;

@@ -4,10 +4,10 @@
 //! show in decide. What no capture can do, a weight to be hung or an object to be put somewhere, stands in the sentence first.
 
 use super::site::{Advice, Capture, Site};
-use crate::capture::arm_motion::ArmMotion;
-use crate::capture::request::Kind;
 use crate::page::channel_in_words;
 use crate::page::words;
+use capture::arm_motion::ArmMotion;
+use capture::request::Kind;
 use twin::effects::{Experiment, Separation, Stage, find};
 
 use Capture::{Arm, Elsewhere, StrokeAgain, Strokes};

@@ -1,15 +1,15 @@
 //! The motions that an advice asks for of an arm that no bridge drives, planned within the limits of its cell and written as CSV: a
 //! row a control cycle, time and the commanded position of each joint.
 
-use crate::capture::arm_motion::ArmMotion;
-use crate::capture::body::Body;
-use crate::capture::excitation;
-use crate::capture::limits;
-use crate::capture::pace;
-use crate::capture::plan::plan;
-use crate::capture::rate::RATE;
-use crate::capture::request::Request;
 use crate::diagnose::answer::NextMotion;
+use capture::arm_motion::ArmMotion;
+use capture::body::Body;
+use capture::excitation;
+use capture::limits;
+use capture::pace;
+use capture::plan::plan;
+use capture::rate::RATE;
+use capture::request::Request;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS, joints_from};
 use shared_mem::output::{Destination, OutputError};
@@ -137,7 +137,7 @@ fn csv(names: &[String], set_points: &[SetPoint]) -> Csv {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::request::Kind;
+    use capture::request::Kind;
     use shared_mem::cell::{Cell, ClipEntry, ClipKind};
     use shared_mem::msg::arm::ArmState;
     use shared_mem::recording::{ClipInfo, ClipWriter, SessionFiles};

@@ -12,7 +12,7 @@
 
 use super::arm_clips::ArmClips;
 use super::measured::{Row, StageName};
-use crate::forward::object::{self, ObjectClips};
+use inference::forward::object::{self, ObjectClips};
 use nalgebra::DVector;
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;

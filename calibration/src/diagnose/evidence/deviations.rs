@@ -11,8 +11,8 @@
 //! An object alone begins from its measured motion. Where it tumbles, each impact of a corner multiplies what that start and the
 //! simulated impact are off by, so that it may come to rest elsewhere and turned otherwise by a lot.
 
-use crate::estimate::Random;
-use crate::forward::object::{Channel, ObjectClips, Part, Row};
+use inference::estimate::Random;
+use inference::forward::object::{Channel, ObjectClips, Part, Row};
 use nalgebra::Vector3;
 use shared_mem::recording::ObjectSeries;
 

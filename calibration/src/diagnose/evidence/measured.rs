@@ -4,9 +4,9 @@
 //! nothing. A hypothesis is a choice of which numbers are free; [`Selected`] makes it a [`ClipModel`] of its own.
 
 use super::scatter::{OwnNumbers, Scatter, WithOwn};
-use crate::engine::Engine;
-use crate::estimate::{ClipModel, Impossible, Unknown};
-use crate::forward::arm::following::Moment;
+use inference::engine::Engine;
+use inference::estimate::{ClipModel, Impossible, Unknown};
+use inference::forward::arm::following::Moment;
 use std::sync::Arc;
 
 /// Part of a clip to which a channel's gap is counted.

@@ -2,7 +2,7 @@
 //! where the step before it was judged, a step is judged against the point that was just linearised, and every trial is held
 //! against the same hypothesis.
 
-use crate::estimate::Impossible;
+use inference::estimate::Impossible;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -4,7 +4,7 @@
 //! one by a little in most clips and by a lot in some: a blow on an edge, a second touch. Those numbers follow a Student
 //! t distribution together (Lange, Little & Taylor 1989), so that one clip that went its own way does not decide.
 
-use crate::estimate::Random;
+use inference::estimate::Random;
 use std::fmt::Debug;
 use std::ops::Range;
 

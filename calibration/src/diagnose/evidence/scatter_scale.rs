@@ -6,7 +6,7 @@
 //! costs no simulation.
 
 use super::scatter::Scatter;
-use crate::kept::numbers::matrix;
+use inference::kept::numbers::matrix;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -70,7 +70,7 @@ fn deviance(clip: &Around, scatter: &Scatter) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::Random;
+    use inference::estimate::Random;
 
     /// Clips with one random effect, each seen a hundred times with a noise of one sigma.
     fn clips(deviations: &[f64]) -> Vec<Around> {

@@ -13,9 +13,9 @@ use super::bench::Bench;
 use crate::diagnose::evidence::measured::{Channel, Evidence, Group, Measured, Near, Reach, Row};
 use crate::diagnose::evidence::recent::Recent;
 use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
-use crate::engine::Engine;
-use crate::estimate::{ClipModel, Impossible};
-use crate::forward::arm::following::Moment;
+use inference::engine::Engine;
+use inference::estimate::{ClipModel, Impossible};
+use inference::forward::arm::following::Moment;
 use std::sync::Arc;
 
 /// Clips around a point where another program simulates strokes; elsewhere the clips as they are.

@@ -2,7 +2,7 @@
 
 use super::bench::Bench;
 use crate::diagnose::evidence::measured::{Measured, Selected};
-use crate::estimate::ClipModel as _;
+use inference::estimate::ClipModel as _;
 use rayon::prelude::*;
 
 impl<E: Measured> Bench<'_, E> {

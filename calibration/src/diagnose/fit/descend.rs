@@ -11,7 +11,7 @@ use super::effort::Effort;
 use super::floor;
 use super::sweep::{Reduced, Swept};
 use crate::diagnose::evidence::measured::Measured;
-use crate::estimate::Descent;
+use inference::estimate::Descent;
 use nalgebra::{DMatrix, DVector};
 
 /// A fit has converged when a step promises less than this of the deviance: a fiftieth of a nat decides nothing. Where more is
@@ -144,9 +144,9 @@ mod tests {
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{bench, shipped};
-    use crate::estimate::{ClipModel, Impossible};
-    use crate::forward::setting;
-    use crate::interrupt::Interrupt;
+    use inference::estimate::{ClipModel, Impossible};
+    use inference::forward::setting;
+    use inference::interrupt::Interrupt;
     use shared_mem::msg::MAX_JOINTS;
     use std::sync::atomic::{AtomicUsize, Ordering};
 

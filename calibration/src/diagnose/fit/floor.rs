@@ -10,8 +10,8 @@ use super::sweep::{Column, Swept};
 use crate::diagnose::evidence::measured::{Channel, Group, Measured};
 use crate::diagnose::evidence::noise::correlation_length;
 use crate::diagnose::library::Library;
-use crate::estimate::Impossible;
-use crate::statistics::median;
+use inference::estimate::Impossible;
+use inference::statistics::median;
 use nalgebra::{DMatrix, DVector};
 
 /// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any

@@ -10,9 +10,9 @@
 use super::bench::{Bench, Hypothesis};
 use super::quadratic::minimum;
 use crate::diagnose::evidence::measured::Evidence;
-use crate::forward::setting::Setting;
 use crate::page::{Size, UNBOUNDED};
-use crate::statistics::student_sigmas;
+use inference::forward::setting::Setting;
+use inference::statistics::student_sigmas;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};

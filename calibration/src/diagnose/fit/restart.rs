@@ -7,7 +7,7 @@
 use super::bench::{Bench, Clips};
 use super::sweep::Precision;
 use crate::diagnose::evidence::measured::Measured;
-use crate::statistics::median;
+use inference::statistics::median;
 use nalgebra::DVector;
 
 /// A clip stands out that costs so many times the typical distance from the median more than the median does, and at least
@@ -79,9 +79,9 @@ mod tests {
     use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{bench, shipped};
-    use crate::estimate::{ClipModel, Impossible, Random};
-    use crate::forward::setting;
-    use crate::interrupt::Interrupt;
+    use inference::estimate::{ClipModel, Impossible, Random};
+    use inference::forward::setting;
+    use inference::interrupt::Interrupt;
     use shared_mem::msg::MAX_JOINTS;
 
     const SIGMA: f64 = 0.02;

@@ -13,8 +13,8 @@ use crate::diagnose::evidence::measured::{Group, Measured, Reach};
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::evidence::scatter_scale::Around;
 use crate::diagnose::library::{Alternative, Library};
-use crate::estimate::{Eliminated, Impossible};
-use crate::kept::numbers::matrix;
+use inference::estimate::{Eliminated, Impossible};
+use inference::kept::numbers::matrix;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -320,7 +320,7 @@ fn gram(clip: &SweptClip, evidence: &impl Measured, weights: &[f64]) -> DMatrix<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::forward::setting;
+    use inference::forward::setting;
     use shared_mem::cell::Cell;
     use shared_mem::msg::MAX_JOINTS;
     use std::path::Path;

@@ -45,7 +45,7 @@ mod tests {
     use crate::diagnose::fit::effort::Effort;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{on_bench, shipped, truth, with_effect};
-    use crate::forward::setting;
+    use inference::forward::setting;
     use shared_mem::msg::MAX_JOINTS;
 
     /// The world is integrated in other steps than the twin's, so its friction is another in the twin.

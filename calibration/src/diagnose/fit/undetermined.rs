@@ -75,7 +75,7 @@ mod tests {
     use crate::benchmark::world::{Kind, World};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
-    use crate::forward::setting;
+    use inference::forward::setting;
     use shared_mem::theta::Theta;
     use twin::arm::MAX_JOINTS;
 

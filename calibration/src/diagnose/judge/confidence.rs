@@ -3,7 +3,7 @@
 use super::trial::{Step, Trial, net};
 use crate::diagnose::criteria::NAMED_IS_WRONG;
 use crate::diagnose::library::Library;
-use crate::statistics::student_sigmas;
+use inference::statistics::student_sigmas;
 
 /// Rivals this close cannot be told apart [nats].
 const NEAR: f64 = 4.0;
@@ -79,7 +79,7 @@ mod tests {
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::fit::sweep::Reduced;
     use crate::diagnose::test_bench::shipped;
-    use crate::forward::setting;
+    use inference::forward::setting;
     use nalgebra::DMatrix;
     use shared_mem::msg::MAX_JOINTS;
     use std::marker::PhantomData;

@@ -6,8 +6,8 @@
 
 use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::fit::bench::Hypothesis;
-use crate::forward::object::Own;
-use crate::statistics::student_sigmas;
+use inference::forward::object::Own;
+use inference::statistics::student_sigmas;
 
 /// A slope of so many sigmas of a normal distribution, or as unlikely a one of few clips, is no chance: p = 0.02.
 const NO_CHANCE: f64 = 2.33;

@@ -211,7 +211,7 @@ mod tests {
     use crate::benchmark::world::Kind;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
-    use crate::forward::setting;
+    use inference::forward::setting;
     use shared_mem::msg::MAX_JOINTS;
 
     fn residuals(sizes: &[f64]) -> Residuals {

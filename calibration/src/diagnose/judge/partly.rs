@@ -124,7 +124,7 @@ mod tests {
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
-    use crate::forward::setting;
+    use inference::forward::setting;
     use shared_mem::msg::MAX_JOINTS;
 
     fn likelier(nats: f64) -> Predicted {

@@ -10,7 +10,7 @@ use crate::diagnose::evidence::scatter_scale::{Around, at_the_best_scale};
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
 use crate::diagnose::fit::left_out::shift_to;
 use crate::diagnose::fit::quadratic::value;
-use crate::statistics::median;
+use inference::statistics::median;
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,9 +9,9 @@ use crate::diagnose::answer::{Change, Gap, SensorGap, TorqueRms};
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Bench;
-use crate::forward::object::Replays;
-use crate::forward::setting;
 use crate::page::in_unit;
+use inference::forward::object::Replays;
+use inference::forward::setting;
 use shared_mem::cell::Tolerance;
 use shared_mem::recording::Session;
 

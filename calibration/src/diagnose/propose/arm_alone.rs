@@ -11,9 +11,9 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
 use crate::diagnose::fit::{stages, undetermined};
 use crate::diagnose::judge::trial::Step;
-use crate::estimate::{ClipModel, Impossible};
-use crate::forward::arm::following::Moment;
 use crate::page::words;
+use inference::estimate::{ClipModel, Impossible};
+use inference::forward::arm::following::Moment;
 use shared_mem::progress::Progress;
 
 /// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there.

@@ -101,7 +101,7 @@ mod tests {
     use crate::benchmark::world::{Fault, Kind, World};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped};
-    use crate::forward::setting;
+    use inference::forward::setting;
     use shared_mem::theta::{EffectTheta, Theta};
 
     #[test]

@@ -7,7 +7,7 @@ use crate::diagnose::evidence::measured::Measured;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
-use crate::forward::Setting;
+use inference::forward::Setting;
 use twin::effects::{Search, Stage};
 
 /// Other starts of a fit are this share of the strongest that is met in practice away.
@@ -339,7 +339,7 @@ mod tests {
     use crate::diagnose::evidence::arm_clips::ArmClips;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, on_strokes, shipped, with_effect};
-    use crate::forward::setting;
+    use inference::forward::setting;
     use shared_mem::msg::MAX_JOINTS;
     use shared_mem::theta::{EffectTheta, Theta};
 

@@ -4,9 +4,9 @@
 use super::Model;
 use super::finding::Finding;
 use super::session::Used;
-use crate::estimate::{ClipFit, Fit};
-use crate::forward::Setting;
 use crate::identify::answer::{Figures, Identification};
+use inference::estimate::{ClipFit, Fit};
+use inference::forward::Setting;
 use nalgebra::DMatrix;
 use twin::effects::{Parameter, Search, registry};
 

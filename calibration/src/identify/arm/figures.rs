@@ -2,11 +2,11 @@
 
 use super::session::Used;
 use super::{ArmError, Model};
-use crate::estimate::{Options, Random, Subset, score};
-use crate::forward::arm::Channel;
 use crate::identify::answer::{ClipGap, Figures, Gap, Identification};
 use crate::identify::run::RunError;
 use crate::page::Trace;
+use inference::estimate::{Options, Random, Subset, score};
+use inference::forward::arm::Channel;
 use rayon::prelude::*;
 
 /// Points of a picture's line.

@@ -1,9 +1,9 @@
 //! What a fit tells about the arm, number by number: values, intervals, correlations.
 
-use crate::estimate::{Intervals, Unknown, at_bounds};
-use crate::forward::Settings;
 use crate::identify::answer::{Identification, Parameter};
 use crate::identify::run::Outcome;
+use inference::estimate::{Intervals, Unknown, at_bounds};
+use inference::forward::Settings;
 use std::collections::BTreeMap;
 
 /// Everything that a fit tells.

@@ -2,11 +2,11 @@
 //! the joints' motion is taken.
 
 use super::{ArmError, Numbers, begun, session};
-use crate::estimate::{ClipModel as _, Options as FitOptions, fit};
-use crate::forward::Settings;
-use crate::forward::arm::ArmClips;
-use crate::forward::setting::{arm_numbers, complete};
-use crate::interrupt::Interrupt;
+use inference::estimate::{ClipModel as _, Options as FitOptions, fit};
+use inference::forward::Settings;
+use inference::forward::arm::ArmClips;
+use inference::forward::setting::{arm_numbers, complete};
+use inference::interrupt::Interrupt;
 use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;

@@ -4,9 +4,9 @@
 use super::Model;
 use super::session::joint_of;
 use super::start::costs;
-use crate::estimate::{ClipModel, Fit, Options, Subset, Unknown, fit};
-use crate::forward::Setting;
-use crate::interrupt::Interrupt;
+use inference::estimate::{ClipModel, Fit, Options, Subset, Unknown, fit};
+use inference::forward::Setting;
+use inference::interrupt::Interrupt;
 use rayon::prelude::*;
 use twin::effects::Search;
 

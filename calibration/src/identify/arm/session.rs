@@ -1,12 +1,12 @@
 //! Which clips of a session can be used for the arm, and for what. What cannot be used is left out and told.
 
 use super::{ArmError, Model};
-use crate::estimate::{ClipModel as _, Unknown};
-use crate::forward::Setting;
-use crate::forward::arm::{Channel, LeftOut};
 use crate::identify::answer::{self, Clips, Identification};
 use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
+use inference::estimate::{ClipModel as _, Unknown};
+use inference::forward::Setting;
+use inference::forward::arm::{Channel, LeftOut};
 use rayon::prelude::*;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ReadError, Session};

@@ -3,10 +3,10 @@
 
 use super::Model;
 use super::session::joint_of;
-use crate::estimate::{ClipModel as _, Unknown};
-use crate::forward::Setting;
-use crate::forward::arm::Row;
-use crate::interrupt::Interrupt;
+use inference::estimate::{ClipModel as _, Unknown};
+use inference::forward::Setting;
+use inference::forward::arm::Row;
+use inference::interrupt::Interrupt;
 use rayon::prelude::*;
 use shared_mem::cell::Cell;
 use shared_mem::msg::{Joints, MAX_JOINTS};

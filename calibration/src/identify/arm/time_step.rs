@@ -5,7 +5,7 @@
 //! terms of higher order (Richardson 1911). The numbers move by one Gauss-Newton step of that difference.
 
 use super::Model;
-use crate::estimate::{
+use inference::estimate::{
     ClipFit, ClipModel as _, Fit, Impossible, Random, Shifted, Subset, Unknown, at_bounds, moved_by,
 };
 use nalgebra::DVector;
@@ -59,11 +59,11 @@ mod tests {
     use super::*;
     use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
-    use crate::estimate::{Options, fit};
-    use crate::forward::Settings;
-    use crate::forward::arm::{ArmClips, CHANNELS};
-    use crate::forward::setting::{arm_numbers, complete};
     use crate::identify::arm::Numbers;
+    use inference::estimate::{Options, fit};
+    use inference::forward::Settings;
+    use inference::forward::arm::{ArmClips, CHANNELS};
+    use inference::forward::setting::{arm_numbers, complete};
     use shared_mem::cell::Cell;
     use std::path::Path;
 

@@ -3,10 +3,10 @@
 use super::Model;
 use super::finding::Finding;
 use super::session::{Used, joint_of};
-use crate::forward::Setting;
 use crate::identify::answer::Untold;
 use crate::identify::run::Optimizer;
 use crate::page::number_in_words;
+use inference::forward::Setting;
 use twin::effects::{Robot, find};
 
 /// A gain whose 95 % interval is wider than this share of it, to either side, is not told.

@@ -3,10 +3,10 @@
 use super::fit::Found;
 use super::model::Motion;
 use super::{Looked, Material};
-use crate::estimate::ClipFit;
 use crate::identify::answer::{ClipGap, Clips, Figures, Gap, Identification, Parameter, Untold};
 use crate::identify::remarks::grouped;
 use crate::page::Trace;
+use inference::estimate::ClipFit;
 use std::collections::BTreeMap;
 
 /// Below so many motions the interval rests on how noisy the poses are: whether friction is the same each time remains open.

@@ -2,9 +2,9 @@
 
 use super::model::{Motion, Motions, best_fit};
 use super::noise::Noise;
-use crate::estimate::interval::LEVEL;
-use crate::estimate::{ClipFit, Fit, Intervals, Options, Unknown, score};
-use crate::statistics::student;
+use inference::estimate::interval::LEVEL;
+use inference::estimate::{ClipFit, Fit, Intervals, Options, Unknown, score};
+use inference::statistics::student;
 
 /// A number is not identifiable if its interval, to either side, is more than this share of what slows the part in all: the other may
 /// as well be what does.

@@ -30,9 +30,9 @@ mod together;
 
 use super::answer::{Identification, LeftOut};
 use super::remarks::grouped;
-use crate::interrupt::Interrupt;
 use alone::Alone;
 use fit::{Found, held_out, scored};
+use inference::interrupt::Interrupt;
 use model::Motion;
 use noise::Noise;
 use positions::Positions;

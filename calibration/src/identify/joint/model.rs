@@ -2,7 +2,7 @@
 //!
 //! Each motion has its own start, position and velocity, which its rows alone say: eliminated with priors so wide that they say nothing.
 
-use crate::estimate::{ClipModel, Fit, Impossible, Options, Random, Unknown, fit_from};
+use inference::estimate::{ClipModel, Fit, Impossible, Options, Random, Unknown, fit_from};
 use twin::world::LoneJoint;
 
 /// One sigma of a motion's own start, in those of its noise.

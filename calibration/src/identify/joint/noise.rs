@@ -1,7 +1,7 @@
 //! How noisy recorded positions of a joint are, from the rows themselves: what changes from row to row, and what changes while the
 //! part rests.
 
-use crate::statistics::median;
+use inference::statistics::median;
 
 /// Rows of a window in which a part may rest.
 const WINDOW: usize = 30;

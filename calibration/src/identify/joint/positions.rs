@@ -1,7 +1,7 @@
 //! Where a joint is over a clip: the pose of its part as seen from the body that carries it.
 
 use super::subject::Subject;
-use crate::statistics::median;
+use inference::statistics::median;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use shared_mem::recording::{Clip, ObjectSeries};
 use std::f64::consts::{PI, TAU};

@@ -6,7 +6,7 @@ use super::alone::{Alone, KEPT};
 use super::fit::held_out;
 use super::model::{Motion, best_fit};
 use super::noise::Noise;
-use crate::estimate::Fit;
+use inference::estimate::Fit;
 
 /// Cuts of a motion's beginning, each by the same number of rows.
 const CUTS: usize = 24;

@@ -2,10 +2,10 @@
 
 use super::ObjectError;
 use super::material::Material;
-use crate::engine::Engine;
-use crate::forward::object::Replays;
 use crate::identify::answer::{ClipGap, Figures, Identification};
 use crate::page::Trace;
+use inference::engine::Engine;
+use inference::forward::object::Replays;
 use rayon::prelude::*;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;

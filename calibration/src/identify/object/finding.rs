@@ -2,10 +2,10 @@
 
 use super::fit::ObjectFit;
 use super::material::Material;
-use crate::estimate::{Fit, Intervals, Unknown};
-use crate::forward::{Setting, Settings};
 use crate::identify::answer::{Advice, Identification, Parameter, Untold};
 use crate::page::number_in_words;
+use inference::estimate::{Fit, Intervals, Unknown};
+use inference::forward::{Setting, Settings};
 use std::collections::BTreeMap;
 
 /// An interval wider than this share of the search's range, to either side, tells nothing.
@@ -141,7 +141,7 @@ impl<'a> Finding<'a> {
         let share = |k: usize| half[k] / (self.unknowns[k].upper - self.unknowns[k].lower);
         let told = (0..half.len()).filter(|k| half[*k].is_finite() && !self.held[*k]);
         let Some(worst) = told.max_by(|a, b| share(*a).total_cmp(&share(*b))) else { return Vec::new() };
-        let advice = |(clip, file): (&crate::estimate::ClipFit, &String)| Advice {
+        let advice = |(clip, file): (&inference::estimate::ClipFit, &String)| Advice {
             record: format!("one more {motion} like {file}"),
             parameter: self.unknowns[worst].name.clone(),
             now: half[worst],

@@ -8,9 +8,9 @@
 
 use super::step::{Linearised, Question};
 use super::vicinity::points;
-use crate::estimate::{ClipModel as _, Impossible, Random, Unknown};
-use crate::forward::object::{ALL, Channel, ModelError, ObjectClips, Own, Part};
-use crate::kept::{Fingerprint, Kept, Trail};
+use inference::estimate::{ClipModel as _, Impossible, Random, Unknown};
+use inference::forward::object::{ALL, Channel, ModelError, ObjectClips, Own, Part};
+use inference::kept::{Fingerprint, Kept, Trail};
 use rayon::prelude::*;
 use shared_mem::cell::PoseNoise;
 

@@ -2,10 +2,10 @@
 
 use super::screen::{Screened, screened};
 use super::{ObjectError, Options};
-use crate::forward::arm::one_piece;
 use crate::identify::answer::{Clips, LeftOut};
 use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
+use inference::forward::arm::one_piece;
 use rayon::prelude::*;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::console;

@@ -6,13 +6,13 @@
 use super::ObjectError;
 use super::fit::fit_object;
 use super::polish::let_go;
-use crate::estimate::interval::LEVEL;
-use crate::estimate::{ClipModel as _, Unknown};
-use crate::forward::Settings;
-use crate::forward::object::ObjectClips;
-use crate::interrupt::Interrupt;
-use crate::kept::Kept;
-use crate::statistics::student;
+use inference::estimate::interval::LEVEL;
+use inference::estimate::{ClipModel as _, Unknown};
+use inference::forward::Settings;
+use inference::forward::object::ObjectClips;
+use inference::interrupt::Interrupt;
+use inference::kept::Kept;
+use inference::statistics::student;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
 

@@ -4,11 +4,11 @@
 //! elsewhere than simulated finds its own way first. A clip that nothing fits counts less, so that it does not steer
 //! the others.
 
-use crate::estimate::{
+use inference::estimate::{
     ClipFit, ClipModel, Descent, Fit, Impossible, Intervals, Options, Random, Unknown, at_bounds, fit_from,
     without_leaning,
 };
-use crate::forward::object::ObjectClips;
+use inference::forward::object::ObjectClips;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -7,8 +7,8 @@
 //! is searched at leisure; then points are scattered there, less wide.
 
 use super::paper::{Slip, SurfaceLoss};
-use crate::estimate::{ClipModel as _, Evolution, Impossible, Unknown, minimise, search};
-use crate::kept::{Fingerprint, Trail};
+use inference::estimate::{ClipModel as _, Evolution, Impossible, Unknown, minimise, search};
+use inference::kept::{Fingerprint, Trail};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::StandardNormal;

@@ -1,0 +1,337 @@
+//! Clips with an object: what the twin makes of every clip under any parameters, and how far that is from what was
+//! recorded. Called by identification and by the diagnosis.
+//!
+//! A clip's rows are its poses: position along x, y, z and rotation vector about them, measured less predicted, each in
+//! sigmas of the tracker's noise, base frame; and, where asked for, the joints from the hit on: the blow that the arm
+//! takes says how heavy the object is. Every clip has numbers of its own ([`Own`]): the hit above all differs a little
+//! from any simulated one, and read as structure that little would be taken for an effect that is not there.
+//!
+//! | file | owns |
+//! |---|---|
+//! | `own` | the numbers of a clip's own |
+//! | `clip` | a recorded clip, prepared |
+//! | `clearance` | how far tool and object are apart |
+//! | `rollout` | a clip in the twin |
+//! | `simulator` | a clip by another program, completed by the twin |
+//! | `replayed` | the figures of `twin replay`, whoever simulates |
+//! | `outcome` | what came of it |
+//! | `cache` | what of it can be used again |
+//! | `rows` | what every residual is about |
+
+mod cache;
+mod clearance;
+mod clip;
+mod outcome;
+mod own;
+mod replayed;
+mod rollout;
+mod rows;
+mod simulator;
+
+pub use clearance::{Clearance, alone_until};
+pub use own::{ALL, Axis, Own, Values};
+pub use replayed::Replays;
+pub use rows::{Channel, Part, Row};
+
+use super::Settings;
+use crate::engine::Engine;
+use crate::estimate::{ClipModel, Impossible, Random};
+use cache::ClipCache;
+use clip::ObjectClip;
+use nalgebra::Isometry3;
+use outcome::Outcome;
+use rollout::Job;
+use shared_mem::cell::{Cell, ClipKind, PoseNoise};
+use shared_mem::frames::{Base, Object, Pose};
+use shared_mem::recording::Clip;
+use shared_mem::theta::Theta;
+use simulator::{Simulator, composed, is_whole};
+use std::sync::{Arc, Mutex};
+use twin::effects::CameraMemory;
+use twin::rollout::CellRollout;
+use twin::sim::SimError;
+
+/// What the tracker's noise is taken for where cell.toml does not tell it, one sigma.
+const NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 5e-3 };
+
+/// The tracker's noise, one sigma.
+pub fn noise_of(cell: &Cell) -> PoseNoise {
+    cell.object().and_then(|object| object.pose_noise).unwrap_or(NOISE)
+}
+
+/// How far a residual may be off for other reasons than noise, one sigma.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModelError {
+    /// Of poses between the first touch and the moment the tool lets go [m, rad].
+    pub hit: PoseNoise,
+    /// Of poses from then on [m, rad]: one error of the whole rest, however many poses show it. Zero where own numbers
+    /// take what the hit leaves behind.
+    pub rest: PoseNoise,
+    /// Of the joints from the hit on [rad]; `None` leaves the arm out.
+    pub joints: Option<f64>,
+    /// Whether strokes are held against their motion along the table alone. A hit object tips, and how far depends on how the
+    /// table yields under its edges, which the twin's rigid one does not: read as structure it would be a centre of mass
+    /// that lies too low.
+    pub flat: bool,
+}
+
+impl Default for ModelError {
+    fn default() -> Self {
+        let none = PoseNoise { position: 0.0, rotation: 0.0 };
+        Self { hit: PoseNoise { position: 3e-3, rotation: 0.03 }, rest: none, joints: None, flat: false }
+    }
+}
+
+/// Clips with an object, and what numbers mean for the cell.
+pub struct ObjectClips {
+    cell: Cell,
+    noise: PoseNoise,
+    error: ModelError,
+    clips: Vec<ObjectClip>,
+    caches: Vec<ClipCache>,
+    /// The other program where there is one, and what came of it, clip by clip.
+    simulator: Option<Simulator>,
+    simulated: Vec<ClipCache>,
+    /// Idle workers; as many as threads were ever at work.
+    workers: Mutex<Vec<CellRollout>>,
+    worker: CellRollout,
+    settings: Settings,
+}
+
+/// What the twin makes of a clip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// The poses that the tracker would have reported, one for each recorded one.
+    pub poses: Vec<Pose<Base, Object>>,
+    /// Stamp of the first touch; `None` where tool and object did not touch.
+    pub contact_ns: Option<u64>,
+}
+
+impl ObjectClips {
+    /// Clips of a cell, in their order; those without poses are left out.
+    ///
+    /// # Errors
+    /// [`SimError`] when the cell cannot be simulated.
+    pub fn new(cell: &Cell, clips: Vec<Clip>, settings: Settings) -> Result<Self, SimError> {
+        let noise = noise_of(cell);
+        let prepared = |clip| ObjectClip::new(clip, cell, noise.position);
+        let clips: Vec<_> = clips.into_iter().filter_map(prepared).collect();
+        let [caches, simulated] = [(), ()].map(|()| clips.iter().map(|_| ClipCache::default()).collect());
+        let worker = CellRollout::new(cell, None)?;
+        let (error, workers) = (ModelError::default(), Mutex::default());
+        let (cell, simulator) = (cell.clone(), None);
+        Ok(Self { cell, noise, error, clips, caches, simulator, simulated, workers, worker, settings })
+    }
+
+    /// The same simulated by another program, where there is one; `nominal`: the cell's nominal parameters.
+    #[must_use]
+    pub fn simulated_by(mut self, engine: Option<&Arc<Engine>>, nominal: &Theta) -> Self {
+        self.simulator = engine.map(|engine| Simulator { engine: Arc::clone(engine), nominal: nominal.clone() });
+        self
+    }
+
+    /// The other program.
+    #[must_use]
+    pub fn engine(&self) -> Option<&Arc<Engine>> {
+        self.simulator.as_ref().map(|simulator| &simulator.engine)
+    }
+
+    /// How far residuals may be off for other reasons than noise.
+    pub fn model_error(&self) -> ModelError {
+        self.error
+    }
+
+    /// The tracker's noise that poses are held against.
+    pub fn noise(&self) -> PoseNoise {
+        self.noise
+    }
+
+    /// Changes [`Self::model_error`].
+    pub fn set_model_error(&mut self, error: ModelError) {
+        if error.joints.is_some() != self.error.joints.is_some() {
+            self.caches.iter_mut().chain(&mut self.simulated).for_each(|cache| *cache = ClipCache::default());
+        }
+        self.error = error;
+    }
+
+    /// What varies from clip to clip, in the order of [`ALL`], with the scatter that is assumed until it is estimated;
+    /// 0 where it means nothing in any of these clips.
+    pub fn random(&self) -> Vec<Random> {
+        let kinds = || self.clips.iter().map(|clip| clip.recorded.kind);
+        let sigma = |own: Own| {
+            let acting = kinds().filter(|kind| own.acts_in(*kind));
+            acting.map(|kind| own.sigma(&self.cell, kind)).fold(0.0, f64::max)
+        };
+        ALL.map(|own| Random { sigma: sigma(own), ..own.random() }).to_vec()
+    }
+
+    /// What the twin makes of a clip.
+    ///
+    /// # Errors
+    /// [`Impossible`] when the cell cannot be simulated with these numbers.
+    pub fn predict(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Prediction, Impossible> {
+        let own = Values::new(own, self.clips[clip].recorded.kind);
+        let outcome = self.outcome(clip, shared, &own)?;
+        Ok(Prediction { poses: reported(&outcome, &self.clips[clip], &own), contact_ns: outcome.contact_ns })
+    }
+
+    /// What every residual of a clip is about.
+    pub fn rows(&self, clip: usize) -> Vec<Row> {
+        rows::rows(&self.clips[clip], self.error.joints.is_some())
+    }
+
+    /// What is known about the cell.
+    pub fn cell(&self) -> &Cell {
+        &self.cell
+    }
+
+    /// A recorded clip.
+    pub fn clip(&self, clip: usize) -> &Clip {
+        &self.clips[clip].recorded
+    }
+
+    fn outcome(&self, clip: usize, shared: &[f64], own: &Values) -> Result<Arc<Outcome>, Impossible> {
+        let theta = self.settings.theta(shared);
+        let Some(simulator) = &self.simulator else { return self.by_twin(clip, &theta, own) };
+        let cache = &self.simulated[clip];
+        if let Some(outcome) = cache.outcome(&theta, own) {
+            return Ok(outcome);
+        }
+        let (known, standing) = (simulator.part(&theta), own.standing());
+        let mut outcome = self.job(clip, (&known, &standing), |mut job| simulator.outcome(&mut job))?;
+        if !is_whole((&theta, &known), own) {
+            let [with, without] = [self.by_twin(clip, &theta, own)?, self.by_twin(clip, &known, &standing)?];
+            outcome = composed(&outcome, &with, &without);
+        }
+        Ok(cache.keep_outcome(theta, own, outcome))
+    }
+
+    fn by_twin(&self, clip: usize, theta: &Theta, own: &Values) -> Result<Arc<Outcome>, Impossible> {
+        let cache = &self.caches[clip];
+        if let Some(outcome) = cache.outcome(theta, own) {
+            return Ok(outcome);
+        }
+        let outcome = self.job(clip, (theta, own), |job| job.run())?;
+        Ok(cache.keep_outcome(theta.clone(), own, outcome))
+    }
+
+    /// Has something done by an idle worker.
+    fn job(
+        &self,
+        clip: usize,
+        (theta, own): (&Theta, &Values),
+        work: impl FnOnce(Job<'_>) -> Result<Outcome, Impossible>,
+    ) -> Result<Outcome, Impossible> {
+        let (clip, cache) = (&self.clips[clip], &self.caches[clip]);
+        let idle = self.workers.lock().expect("no rollout has panicked").pop();
+        let mut worker = idle.unwrap_or_else(|| self.worker.clone());
+        let joints_ns = if self.error.joints.is_some() { &clip.arm_ns[..] } else { &[] };
+        let outcome = work(Job { cell: &self.cell, clip, theta, own, joints_ns, worker: &mut worker, cache });
+        self.workers.lock().expect("no rollout has panicked").push(worker);
+        outcome
+    }
+
+    /// Measured less predicted, row by row as [`Self::rows`] says [m, rad].
+    ///
+    /// # Errors
+    /// [`Impossible`] when the cell cannot be simulated with these numbers.
+    pub fn errors(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
+        let own = Values::new(own, self.clips[clip].recorded.kind);
+        self.errors_of(clip, &*self.outcome(clip, shared, &own)?, &own)
+    }
+
+    /// The same by the twin, whoever simulates: for what a step changes.
+    ///
+    /// # Errors
+    /// As [`Self::errors`].
+    pub fn twins_errors(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
+        let own = Values::new(own, self.clips[clip].recorded.kind);
+        self.errors_of(clip, &*self.by_twin(clip, &self.settings.theta(shared), &own)?, &own)
+    }
+
+    fn errors_of(&self, clip: usize, outcome: &Outcome, own: &Values) -> Result<Vec<f64>, Impossible> {
+        let clip = &self.clips[clip];
+        let poses = clip.recorded.object.poses.iter().zip(reported(outcome, clip, own));
+        let mut errors: Vec<f64> = poses.flat_map(|(a, b)| difference(&a.isometry(), &b.isometry())).collect();
+        if self.error.joints.is_some() {
+            let measured = &clip.recorded.measured;
+            for (row, predicted) in clip.arm_rows.iter().zip(&outcome.joints) {
+                errors.extend(measured.q_row(*row).iter().zip(predicted).map(|(q, predicted)| q - predicted));
+            }
+        }
+        if errors.iter().all(|error| error.is_finite()) {
+            Ok(errors)
+        } else {
+            Err(Impossible("the twin flies apart with these numbers".into()))
+        }
+    }
+
+    /// One sigma of every row.
+    fn sigmas(&self, clip: usize) -> Vec<f64> {
+        let (noise, error, rows) = (self.noise, self.error, self.rows(clip));
+        let poses = |part| rows.iter().filter(|row| row.part == part && row.channel == Channel::Position(0)).count();
+        // What all resting poses share counts once.
+        let many = (poses(Part::After).max(1) as f64).sqrt();
+        let of = |row: &Row, noise: f64, hit: f64, rest: f64| match row.part {
+            Part::Before => noise,
+            Part::Hit => noise.hypot(hit),
+            Part::Slide => noise.hypot(rest),
+            Part::After => noise.hypot(rest * many),
+        };
+        let flat = error.flat && self.clips[clip].recorded.kind != ClipKind::FreeMotion;
+        let sigma = |row: &Row| match row.channel {
+            Channel::Position(2) | Channel::Rotation(0 | 1) if flat => f64::INFINITY,
+            Channel::Position(_) => of(row, noise.position, error.hit.position, error.rest.position),
+            Channel::Rotation(_) => of(row, noise.rotation, error.hit.rotation, error.rest.rotation),
+            Channel::Joint(_) => error.joints.unwrap_or(1.0),
+        };
+        rows.iter().map(sigma).collect()
+    }
+}
+
+fn reported(outcome: &Outcome, clip: &ObjectClip, own: &Values) -> Vec<Pose<Base, Object>> {
+    let late = outcome.camera.latency_ns() as f64 + own.of(Own::Clock) * 1e9;
+    let mut memory = CameraMemory::default();
+    let stamps = clip.recorded.object.stamps_ns.iter();
+    let seen = |stamp: &u64| {
+        let pose = Pose::from_isometry(outcome.object.at(*stamp as f64 - late));
+        outcome.camera.seen(&mut memory, *stamp, pose)
+    };
+    stamps.map(seen).collect()
+}
+
+impl ClipModel for ObjectClips {
+    fn clips(&self) -> usize {
+        self.clips.len()
+    }
+
+    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+        *out = self.errors(clip, shared, own)?;
+        out.iter_mut().zip(self.sigmas(clip)).for_each(|(error, sigma)| *error /= sigma);
+        Ok(())
+    }
+
+    fn stepped(
+        &self,
+        clip: usize,
+        (shared, own): (&[f64], &[f64]),
+        ((from, from_own), base): ((&[f64], &[f64]), &[f64]),
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        if self.simulator.is_none() {
+            return self.residuals(clip, shared, own, out);
+        }
+        let before = self.twins_errors(clip, from, from_own)?;
+        *out = self.twins_errors(clip, shared, own)?;
+        let rows = out.iter_mut().zip(&before).zip(base).zip(self.sigmas(clip));
+        rows.for_each(|(((out, before), base), sigma)| *out = base + (*out - before) / sigma);
+        Ok(())
+    }
+}
+
+/// Measured less predicted: position along x, y, z [m], rotation vector about them [rad], base frame.
+fn difference(measured: &Isometry3<f64>, predicted: &Isometry3<f64>) -> [f64; 6] {
+    let shift = measured.translation.vector - predicted.translation.vector;
+    let turn = (measured.rotation * predicted.rotation.inverse()).scaled_axis();
+    [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
+}
