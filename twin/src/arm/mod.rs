@@ -67,7 +67,7 @@ pub use nearest::Nearest;
 pub use parts::Part;
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
 pub use trailing::{Trail, Trailing};
-pub use transmission::{Passed, Spring, Transmission};
+pub use transmission::{Passed, Slip, Spring, Transmission};
 pub use urdf::{
     LinkFrame, UrdfBody, UrdfForm, UrdfFrames, UrdfJoint, UrdfShape, with_elements, with_files_found_from,
     with_joint_friction, with_joint_numbers,

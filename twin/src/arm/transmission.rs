@@ -26,13 +26,24 @@ pub struct Spring {
     pub play: f64,
 }
 
+/// How a motor moves against dry friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slip {
+    /// Position [rad].
+    pub q: f64,
+    /// Speed [rad/s], at least 0.
+    pub speed: f64,
+    /// Torque of the motor [N m].
+    pub motor_torque: f64,
+}
+
 /// What lies between the motors and the links.
 pub trait Transmission {
     /// How the gear of a joint yields; `None` where it is rigid.
     fn spring(&self, joint: usize) -> Option<Spring>;
 
-    /// Largest dry friction of a joint [N m] at a motor speed [rad/s] and motor torque [N m].
-    fn dry_friction(&self, joint: usize, speed: f64, motor_torque: f64) -> f64;
+    /// Largest dry friction of a joint [N m].
+    fn dry_friction(&self, joint: usize, slip: Slip) -> f64;
 
     /// Motor speed at which dry friction is `tanh(1)` of its bound [rad/s]; 0 where a joint sticks exactly.
     fn creep(&self, joint: usize) -> f64;
@@ -175,7 +186,7 @@ impl ArmModel {
             twist: motor.q[i] - link.q[i],
             rotor: self.links[i].rotor,
             drive: tau[i] - transmission.drag(i, at.q[i], at.dq[i]),
-            dry: transmission.dry_friction(i, at.dq[i].abs(), tau[i]),
+            dry: transmission.dry_friction(i, Slip { q: at.q[i], speed: at.dq[i].abs(), motor_torque: tau[i] }),
             yields: Yields::of(transmission.creep(i), transmission.presliding(i), bent[i]),
             // Without a rotor nothing could turn on the motor's side of a spring.
             spring: transmission.spring(i).filter(|_| self.links[i].rotor > 0.0),

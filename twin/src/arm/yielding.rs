@@ -121,7 +121,7 @@ fn combined(columns: &[Joints; 6], wrench: &Vector6<f64>) -> Joints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::{PointForce, Presliding, Spring, Transmission};
+    use crate::arm::{PointForce, Presliding, Slip, Spring, Transmission};
 
     fn moving() -> JointState {
         let q = *ArmModel::fr3().ready();
@@ -171,7 +171,7 @@ mod tests {
             None
         }
 
-        fn dry_friction(&self, _joint: usize, _speed: f64, _motor_torque: f64) -> f64 {
+        fn dry_friction(&self, _joint: usize, _slip: Slip) -> f64 {
             self.bound
         }
 

@@ -1,8 +1,8 @@
 //! Everything the nominal cell lacks: effects that a real cell has and that a simulated cell can be given.
 //!
 //! One effect is one file: its equation, source, plausible range, signature, what it is confused with, how a search comes
-//! by it, what separates it from others, what to do about it, what it changes in a model for another simulator, its code and its test: what it says about itself in the words of `info` and `parameter`. [`registry()`] lists them all. A new effect is a new file, its line in the registry, and a field in the struct
-//! of its stage. Effects combine freely; one whose sizes are all neutral is not installed, so it changes no bit.
+//! by it, what separates it from others, what to do about it, what it changes in a model for another simulator, its code and its test: what it says about itself in the words of `info` and `parameter`. [`registry()`] lists them all. A new effect on the arm is a new file and its line in `arm`; of another stage, a new file, its line in the registry and a field in
+//! the struct of its stage. Effects combine freely; one whose sizes are all neutral is not installed, so it changes no bit.
 //!
 //! | folder | acts on | read by |
 //! |---|---|---|

@@ -4,17 +4,19 @@
 use super::info::EffectInfo;
 use super::values::EffectError;
 use super::{arm, camera, hit, slide};
+use std::sync::LazyLock;
 
 /// Every effect, stage by stage.
 #[must_use]
 pub fn registry() -> &'static [EffectInfo] {
-    EFFECTS
+    static EFFECTS: LazyLock<Vec<EffectInfo>> = LazyLock::new(|| [arm::EFFECTS, BEYOND_THE_ARM].concat());
+    &EFFECTS
 }
 
 /// The effect with this name.
 #[must_use]
 pub fn find(name: &str) -> Option<&'static EffectInfo> {
-    EFFECTS.iter().find(|effect| effect.name == name)
+    registry().iter().find(|effect| effect.name == name)
 }
 
 /// The effect that somebody names.
@@ -45,32 +47,12 @@ impl EffectInfo {
 /// gives no masses.
 #[must_use]
 pub fn unknown_weight() -> &'static EffectInfo {
-    &arm::joint_weight::EFFECT
+    static WEIGHT: EffectInfo = arm::joint_weight::EFFECT;
+    &WEIGHT
 }
 
-static EFFECTS: &[EffectInfo] = &[
-    arm::joint_coulomb_friction::EFFECT,
-    arm::joint_viscous_friction::EFFECT,
-    arm::joint_stribeck_friction::EFFECT,
-    arm::joint_friction_asymmetry::EFFECT,
-    arm::joint_load_friction::EFFECT,
-    arm::joint_presliding_friction::EFFECT,
-    arm::command_delay::EFFECT,
-    arm::command_lag::EFFECT,
-    arm::integral_action::EFFECT,
-    arm::torque_delay::EFFECT,
-    arm::rotor_inertia::EFFECT,
-    arm::payload::EFFECT,
-    arm::torque_gain::EFFECT,
-    arm::joint_elasticity::EFFECT,
-    arm::joint_backlash::EFFECT,
-    arm::joint_encoder_offset::EFFECT,
-    arm::torque_saturation::EFFECT,
-    arm::voltage_saturation::EFFECT,
-    arm::torque_ripple::EFFECT,
-    arm::torque_sensor_bias::EFFECT,
-    arm::base_tilt::EFFECT,
-    arm::joint_weight::EFFECT,
+/// Those that do not act on the arm.
+const BEYOND_THE_ARM: &[EffectInfo] = &[
     hit::restitution::EFFECT,
     hit::contact_compliance::EFFECT,
     hit::tip_friction::EFFECT,

@@ -6,6 +6,7 @@
 //! - Signature: static, in proportion to the horizontal levers of the arm's mass; joint 1 feels it only here.
 //! - Confused with: payload, friction asymmetry, torque gain.
 
+use super::effect::ArmEffect;
 use crate::arm::ArmModel;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -44,8 +45,8 @@ pub(in crate::effects) struct BaseTilt {
     tilt: [f64; 2],
 }
 
-impl BaseTilt {
-    pub(super) fn apply(&self, arm: &mut ArmModel) {
+impl ArmEffect for BaseTilt {
+    fn change(&self, arm: &mut ArmModel) {
         arm.lean_base(Vector3::new(self.tilt[0], self.tilt[1], 0.0));
     }
 }

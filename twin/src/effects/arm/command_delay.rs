@@ -6,6 +6,7 @@
 //! - Signature (C13): phase lag linear in frequency, no change of gain; error of about `delay dq`.
 //! - Confused with: command lag (in slow motion exactly), viscous friction, camera latency (where only the camera sees the arm).
 
+use super::effect::ArmEffect;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
 use crate::effects::parameter::{Parameter, Search};
@@ -49,6 +50,8 @@ pub(in crate::effects) struct CommandDelay {
     /// [s]
     pub(super) delay: f64,
 }
+
+impl ArmEffect for CommandDelay {}
 
 #[cfg(test)]
 mod tests {

@@ -6,6 +6,7 @@
 //! - Signature (C15): gain falls and phase lags with frequency.
 //! - Confused with: command delay (in slow motion exactly; a chirp to 10 Hz tells by the gain).
 
+use super::effect::ArmEffect;
 use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -49,6 +50,8 @@ pub(in crate::effects) struct CommandLag {
     /// Share of the way to the command that is made in a tick.
     share: f64,
 }
+
+impl ArmEffect for CommandLag {}
 
 impl CommandLag {
     /// Until 1e-9 of a command is left [s].

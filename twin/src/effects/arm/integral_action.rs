@@ -7,6 +7,7 @@
 //! - Signature: errors at rest fade within `1 / rate`; slow swings lead instead of lagging.
 //! - Confused with: payload and base tilt (what it fades), dry friction (a stuck joint is pushed free in the end).
 
+use super::effect::ArmEffect;
 use super::transmission::AT_REST;
 use crate::arm::{ArmModel, ControlLaw, JointState, Joints};
 use crate::effects::change::Change;
@@ -46,6 +47,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct IntegralAction {
     rate: Joints,
 }
+
+impl ArmEffect for IntegralAction {}
 
 impl IntegralAction {
     /// What had been summed up where an arm rests at `reading` under `tau` [N m]; nothing of joints that move, and of those

@@ -8,6 +8,7 @@
 //! - Signature (C18): motion lost at each reversal of the torque, not of the velocity; chatter near no load.
 //! - Confused with: Coulomb and Stribeck friction; a load that keeps one flank pressed makes it vanish.
 
+use super::effect::ArmEffect;
 use crate::arm::{Joints, Spring};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -57,6 +58,10 @@ const FLANK_DAMPING: f64 = 10.0;
 pub(in crate::effects) struct JointBacklash {
     play: Joints,
     compliance: Joints,
+}
+
+impl ArmEffect for JointBacklash {
+    const IN_JOINTS: bool = true;
 }
 
 impl JointBacklash {

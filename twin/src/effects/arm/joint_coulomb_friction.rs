@@ -8,7 +8,8 @@
 //! - Signature (C1): odd in velocity and flat over it; `2 coulomb / stiffness` lost at each reversal; odd harmonics.
 //! - Confused with: load friction (alike in one pose), backlash (lost motion too), Stribeck friction (needs creep).
 
-use crate::arm::Joints;
+use super::effect::ArmEffect;
+use crate::arm::{Joints, Slip};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
 use crate::effects::parameter::{Elsewhere, Parameter, Search};
@@ -62,6 +63,18 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct JointCoulombFriction {
     pub(super) coulomb: Joints,
     pub(super) creep: Joints,
+}
+
+impl ArmEffect for JointCoulombFriction {
+    const IN_JOINTS: bool = true;
+
+    fn dry_friction(&self, joint: usize, _: Slip) -> f64 {
+        self.coulomb[joint]
+    }
+
+    fn creep(&self, joint: usize) -> f64 {
+        self.creep[joint]
+    }
 }
 
 /// Of every dry friction: speed over which it builds up, as `tanh(dq / creep)`. Gears creep before they break loose, and

@@ -8,6 +8,7 @@
 //! - Signature (C17): sags by `tau_J / stiffness`, seen by a camera and not by the encoders; a resonance.
 //! - Confused with: payload and camera extrinsics (static sag), torque delay (rings too), rotor inertia below resonance.
 
+use super::effect::ArmEffect;
 use crate::arm::{Joints, Spring};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -53,6 +54,10 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct JointElasticity {
     stiffness: Joints,
     damping: Joints,
+}
+
+impl ArmEffect for JointElasticity {
+    const IN_JOINTS: bool = true;
 }
 
 impl JointElasticity {

@@ -6,6 +6,7 @@
 //! - Signature (C21): the tip is off by a fixed amount in joint space; the encoders themselves never tell.
 //! - Confused with: camera extrinsics, tool offset, joint elasticity (follows the load).
 
+use super::effect::ArmEffect;
 use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -36,6 +37,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct JointEncoderOffset {
     pub(super) offset: Joints,
 }
+
+impl ArmEffect for JointEncoderOffset {}
 
 #[cfg(test)]
 mod tests {

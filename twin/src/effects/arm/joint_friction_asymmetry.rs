@@ -9,6 +9,7 @@
 //! - Signature (C5): even in velocity, flat over speed and over pose.
 //! - Confused with: payload and base tilt (even as well, but follow the pose), torque sensor bias (leaves the motion alone).
 
+use super::effect::ArmEffect;
 use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -53,9 +54,10 @@ pub(in crate::effects) struct JointFrictionAsymmetry {
     fading: f64,
 }
 
-impl JointFrictionAsymmetry {
-    /// Torque that a joint's motor loses at a speed [N m].
-    pub(super) fn torque(&self, joint: usize, dq: f64) -> f64 {
+impl ArmEffect for JointFrictionAsymmetry {
+    const IN_JOINTS: bool = true;
+
+    fn drag(&self, joint: usize, _: f64, dq: f64) -> f64 {
         let share = if self.fading > 0.0 { (dq / self.fading).tanh().abs() } else { 1.0 };
         self.offset[joint] * share
     }

@@ -8,8 +8,9 @@
 //! - Signature (C6): odd in velocity; its size follows the gravity torque over the pose.
 //! - Confused with: Coulomb, Stribeck and presliding friction (alike in one pose), torque gain, payload.
 
+use super::effect::ArmEffect;
 use super::joint_coulomb_friction::CREEP;
-use crate::arm::Joints;
+use crate::arm::{Joints, Slip};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
 use crate::effects::parameter::{Elsewhere, Parameter};
@@ -56,10 +57,15 @@ pub(in crate::effects) struct JointLoadFriction {
     pub(super) creep: Joints,
 }
 
-impl JointLoadFriction {
-    /// Dry friction under a motor torque [N m].
-    pub(super) fn level(&self, joint: usize, motor_torque: f64) -> f64 {
-        self.coefficient[joint] * motor_torque.abs()
+impl ArmEffect for JointLoadFriction {
+    const IN_JOINTS: bool = true;
+
+    fn dry_friction(&self, joint: usize, slip: Slip) -> f64 {
+        self.coefficient[joint] * slip.motor_torque.abs()
+    }
+
+    fn creep(&self, joint: usize) -> f64 {
+        self.creep[joint]
     }
 }
 

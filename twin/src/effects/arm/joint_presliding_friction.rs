@@ -9,7 +9,8 @@
 //! - Confused with: Coulomb friction (its limit at no displacement; creep loses with speed, this with the way), backlash and
 //!   elasticity (a loop without an area).
 
-use crate::arm::{Joints, Presliding};
+use super::effect::ArmEffect;
+use crate::arm::{Joints, Presliding, Slip};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
 use crate::effects::parameter::{Elsewhere, Parameter, Search};
@@ -81,6 +82,14 @@ pub(in crate::effects) struct JointPreslidingFriction {
     pub(super) coulomb: Joints,
     displacement: Joints,
     damping: Joints,
+}
+
+impl ArmEffect for JointPreslidingFriction {
+    const IN_JOINTS: bool = true;
+
+    fn dry_friction(&self, joint: usize, _: Slip) -> f64 {
+        self.coulomb[joint]
+    }
 }
 
 impl JointPreslidingFriction {

@@ -8,8 +8,9 @@
 //! - Signature (C3): what Coulomb friction does not explain lies below three times `velocity`; stick-slip at creep.
 //! - Confused with: Coulomb friction (its limit at no excess), backlash, encoder quantisation.
 
+use super::effect::ArmEffect;
 use super::joint_coulomb_friction::CREEP;
-use crate::arm::Joints;
+use crate::arm::{Joints, Slip};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
 use crate::effects::parameter::{Elsewhere, Parameter};
@@ -76,16 +77,20 @@ pub(in crate::effects) struct JointStribeckFriction {
     pub(super) creep: Joints,
 }
 
-impl JointStribeckFriction {
-    /// Speed over which a joint's friction falls; 0 where it does not [rad/s].
-    pub(super) fn falls_over(&self, joint: usize) -> f64 {
-        if self.excess[joint] > 0.0 { self.velocity[joint] } else { 0.0 }
+impl ArmEffect for JointStribeckFriction {
+    const IN_JOINTS: bool = true;
+
+    fn dry_friction(&self, joint: usize, slip: Slip) -> f64 {
+        let ratio = slip.speed / self.velocity[joint];
+        self.coulomb[joint] + self.excess[joint] * (-ratio * ratio).exp()
     }
 
-    /// Dry friction at a speed [N m].
-    pub(super) fn level(&self, joint: usize, speed: f64) -> f64 {
-        let ratio = speed / self.velocity[joint];
-        self.coulomb[joint] + self.excess[joint] * (-ratio * ratio).exp()
+    fn creep(&self, joint: usize) -> f64 {
+        self.creep[joint]
+    }
+
+    fn falls_over(&self, joint: usize) -> f64 {
+        if self.excess[joint] > 0.0 { self.velocity[joint] } else { 0.0 }
     }
 }
 

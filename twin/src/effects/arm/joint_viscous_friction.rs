@@ -8,6 +8,7 @@
 //! - Confused with: the controller's damping (exactly, where only encoders are logged and the command rests), torque
 //!   delay (takes damping away), command delay.
 
+use super::effect::ArmEffect;
 use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -45,6 +46,14 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct JointViscousFriction {
     pub(super) viscous: Joints,
+}
+
+impl ArmEffect for JointViscousFriction {
+    const IN_JOINTS: bool = true;
+
+    fn drag(&self, joint: usize, _: f64, dq: f64) -> f64 {
+        self.viscous[joint] * dq
+    }
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@
 //! Where the masses of the links are known it is no cause that a diagnosis looks for; where they are not
 //! (`[robot] joints` without `urdf`), its numbers are identified with the gains.
 
+use super::effect::ArmEffect;
 use crate::arm::{JointState, Joints};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -64,6 +65,8 @@ pub(in crate::effects) struct JointWeight {
     sine: Joints,
     cosine: Joints,
 }
+
+impl ArmEffect for JointWeight {}
 
 impl JointWeight {
     /// Torques that hold the arm at `q` against this weight [N m].

@@ -5,68 +5,110 @@
 //! Units SI; joint arrays as everywhere in [`crate::arm`].
 #![allow(non_snake_case)] // tau_J is the Franka Control Interface's own symbol
 
-pub(super) mod base_tilt;
-pub(super) mod command_delay;
-pub(super) mod command_lag;
 mod delay_line;
-pub(super) mod integral_action;
-pub(super) mod joint_backlash;
-pub(super) mod joint_coulomb_friction;
-pub(super) mod joint_elasticity;
-pub(super) mod joint_encoder_offset;
-pub(super) mod joint_friction_asymmetry;
-pub(super) mod joint_load_friction;
-pub(super) mod joint_presliding_friction;
-pub(super) mod joint_stribeck_friction;
-pub(super) mod joint_viscous_friction;
-pub(super) mod joint_weight;
+mod effect;
 mod memory;
-pub(super) mod payload;
-pub(super) mod rotor_inertia;
 #[cfg(test)]
 mod test_arm;
-pub(super) mod torque_delay;
-pub(super) mod torque_gain;
-pub(super) mod torque_ripple;
-pub(super) mod torque_saturation;
-pub(super) mod torque_sensor_bias;
 mod transmission;
-pub(super) mod voltage_saturation;
 
 pub use memory::ArmMemory;
 pub(crate) use memory::JointMemory;
 
 use super::hit::tool_offset::ToolOffset;
-use crate::arm::{ArmModel, ControlLaw, JointState, Joints, Transmission};
+use super::info::EffectInfo;
+use crate::arm::{ArmModel, ControlLaw, JointState, Joints, Slip, Transmission};
+use effect::ArmEffect;
 use shared_mem::cell::ControllerKind;
 use shared_mem::time::TICK;
 
-/// The effects on an arm that are installed. Constant over time: one set may serve many rollouts at once.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ArmEffects {
-    pub(super) joint_coulomb_friction: Option<joint_coulomb_friction::JointCoulombFriction>,
-    pub(super) joint_viscous_friction: Option<joint_viscous_friction::JointViscousFriction>,
-    pub(super) joint_stribeck_friction: Option<joint_stribeck_friction::JointStribeckFriction>,
-    pub(super) joint_friction_asymmetry: Option<joint_friction_asymmetry::JointFrictionAsymmetry>,
-    pub(super) joint_load_friction: Option<joint_load_friction::JointLoadFriction>,
-    pub(super) joint_presliding_friction: Option<joint_presliding_friction::JointPreslidingFriction>,
-    pub(super) command_delay: Option<command_delay::CommandDelay>,
-    pub(super) command_lag: Option<command_lag::CommandLag>,
-    pub(super) integral_action: Option<integral_action::IntegralAction>,
-    pub(super) torque_delay: Option<torque_delay::TorqueDelay>,
-    pub(super) rotor_inertia: Option<rotor_inertia::RotorInertia>,
-    pub(super) payload: Option<payload::Payload>,
-    pub(super) tool_offset: Option<ToolOffset>,
-    pub(super) torque_gain: Option<torque_gain::TorqueGain>,
-    pub(super) joint_elasticity: Option<joint_elasticity::JointElasticity>,
-    pub(super) joint_backlash: Option<joint_backlash::JointBacklash>,
-    pub(super) joint_encoder_offset: Option<joint_encoder_offset::JointEncoderOffset>,
-    pub(super) torque_saturation: Option<torque_saturation::TorqueSaturation>,
-    pub(super) voltage_saturation: Option<voltage_saturation::VoltageSaturation>,
-    pub(super) torque_ripple: Option<torque_ripple::TorqueRipple>,
-    pub(super) torque_sensor_bias: Option<torque_sensor_bias::TorqueSensorBias>,
-    pub(super) base_tilt: Option<base_tilt::BaseTilt>,
-    pub(super) joint_weight: Option<joint_weight::JointWeight>,
+/// The list of all effects on the arm: a file and its line here are an effect. What effects do side by side is added up in
+/// this order; what one does to another's result, or remembers, is called by name below.
+macro_rules! effects_on_the_arm {
+    ($($name:ident: $Effect:ident),* $(,)?) => {
+        $(pub(super) mod $name;)*
+
+        /// What each of them says of itself.
+        pub(super) const EFFECTS: &[EffectInfo] = &[$($name::EFFECT),*];
+
+        /// The effects on an arm that are installed. Constant over time: one set may serve many rollouts at once.
+        #[derive(Debug, Clone, Default, PartialEq)]
+        pub struct ArmEffects {
+            $(pub(super) $name: Option<$name::$Effect>,)*
+            pub(super) tool_offset: Option<ToolOffset>,
+        }
+
+        impl ArmEffects {
+            /// Whether friction or a gear that yields lies between motors and links.
+            pub(crate) fn acts_in_joints(&self) -> bool {
+                $((<$name::$Effect as ArmEffect>::IN_JOINTS && self.$name.is_some()))||*
+            }
+
+            /// Changes the bodies of the arm that moves.
+            fn change(&self, arm: &mut ArmModel) {
+                $(if let Some(effect) = &self.$name {
+                    effect.change(arm);
+                })*
+            }
+
+            fn all_dry_friction(&self, joint: usize, slip: Slip) -> f64 {
+                let mut all = 0.0;
+                $(if <$name::$Effect as ArmEffect>::IN_JOINTS && let Some(effect) = &self.$name {
+                    all += effect.dry_friction(joint, slip);
+                })*
+                all
+            }
+
+            fn largest_creep(&self, joint: usize) -> f64 {
+                let mut largest: f64 = 0.0;
+                $(if <$name::$Effect as ArmEffect>::IN_JOINTS && let Some(effect) = &self.$name {
+                    largest = largest.max(effect.creep(joint));
+                })*
+                largest
+            }
+
+            fn falls_over(&self, joint: usize) -> f64 {
+                let mut largest: f64 = 0.0;
+                $(if <$name::$Effect as ArmEffect>::IN_JOINTS && let Some(effect) = &self.$name {
+                    largest = largest.max(effect.falls_over(joint));
+                })*
+                largest
+            }
+
+            fn all_drag(&self, joint: usize, q: f64, dq: f64) -> f64 {
+                let mut all = 0.0;
+                $(if <$name::$Effect as ArmEffect>::IN_JOINTS && let Some(effect) = &self.$name {
+                    all += effect.drag(joint, q, dq);
+                })*
+                all
+            }
+        }
+    };
+}
+
+effects_on_the_arm! {
+    joint_coulomb_friction: JointCoulombFriction,
+    joint_viscous_friction: JointViscousFriction,
+    joint_stribeck_friction: JointStribeckFriction,
+    joint_friction_asymmetry: JointFrictionAsymmetry,
+    joint_load_friction: JointLoadFriction,
+    joint_presliding_friction: JointPreslidingFriction,
+    command_delay: CommandDelay,
+    command_lag: CommandLag,
+    integral_action: IntegralAction,
+    torque_delay: TorqueDelay,
+    rotor_inertia: RotorInertia,
+    payload: Payload,
+    torque_gain: TorqueGain,
+    joint_elasticity: JointElasticity,
+    joint_backlash: JointBacklash,
+    joint_encoder_offset: JointEncoderOffset,
+    torque_saturation: TorqueSaturation,
+    voltage_saturation: VoltageSaturation,
+    torque_ripple: TorqueRipple,
+    torque_sensor_bias: TorqueSensorBias,
+    base_tilt: BaseTilt,
+    joint_weight: JointWeight,
 }
 
 impl ArmEffects {
@@ -80,16 +122,8 @@ impl ArmEffects {
     #[must_use]
     pub fn real_arm(&self, nominal: &ArmModel) -> ArmModel {
         let mut arm = nominal.clone();
-        if let Some(effect) = &self.rotor_inertia {
-            effect.apply(&mut arm);
-        }
-        if let Some(effect) = &self.payload {
-            effect.apply(&mut arm);
-        }
+        self.change(&mut arm);
         if let Some(effect) = &self.tool_offset {
-            effect.apply(&mut arm);
-        }
-        if let Some(effect) = &self.base_tilt {
             effect.apply(&mut arm);
         }
         arm
@@ -227,7 +261,11 @@ impl ArmEffects {
     #[must_use]
     pub fn taken(&self, joint: usize, state: &JointState, motor_torque: f64) -> f64 {
         let dq = state.dq[joint];
-        let dry = if dq == 0.0 { 0.0 } else { dq.signum() * self.dry_friction(joint, dq.abs(), motor_torque) };
+        let dry = if dq == 0.0 {
+            0.0
+        } else {
+            dq.signum() * self.dry_friction(joint, Slip { q: state.q[joint], speed: dq.abs(), motor_torque })
+        };
         let weight = self.joint_weight.map_or(0.0, |effect| effect.held_at(&state.q)[joint]);
         dry + self.drag(joint, state.q[joint], dq) + weight
     }

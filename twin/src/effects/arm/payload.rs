@@ -6,6 +6,7 @@
 //! - Signature (C10): sags in rest with the gravity regressor over the pose; grows with the square of the frequency too.
 //! - Confused with: torque gain, friction asymmetry (the same in every pose), base tilt.
 
+use super::effect::ArmEffect;
 use crate::arm::{ArmModel, MassProperties};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -72,8 +73,8 @@ pub(in crate::effects) struct Payload {
     centre: [f64; 3],
 }
 
-impl Payload {
-    pub(super) fn apply(&self, arm: &mut ArmModel) {
+impl ArmEffect for Payload {
+    fn change(&self, arm: &mut ArmModel) {
         arm.add_at_flange(&MassProperties::new(self.mass, self.centre, [0.0; 6]));
     }
 }

@@ -7,6 +7,7 @@
 //! - Signature (C9): grows with the square of the frequency, even in velocity, the same in every pose.
 //! - Confused with: payload (depends on the pose), joint elasticity, a stiffness at one frequency.
 
+use super::effect::ArmEffect;
 use crate::arm::{ArmModel, Joints};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -57,8 +58,8 @@ pub(in crate::effects) struct RotorInertia {
     extra: Joints,
 }
 
-impl RotorInertia {
-    pub(super) fn apply(&self, arm: &mut ArmModel) {
+impl ArmEffect for RotorInertia {
+    fn change(&self, arm: &mut ArmModel) {
         arm.add_rotor_inertia(&self.extra);
     }
 }

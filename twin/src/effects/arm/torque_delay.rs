@@ -6,6 +6,7 @@
 //! - Signature (C14): less damping, ringing after fast motion; nothing at rest.
 //! - Confused with: a lower damping, viscous friction (adds what this takes), joint elasticity (rings too).
 
+use super::effect::ArmEffect;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
 use crate::effects::parameter::Parameter;
@@ -38,6 +39,8 @@ pub(in crate::effects) struct TorqueDelay {
     /// [s]
     pub(super) delay: f64,
 }
+
+impl ArmEffect for TorqueDelay {}
 
 #[cfg(test)]
 mod tests {

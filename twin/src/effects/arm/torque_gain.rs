@@ -6,6 +6,7 @@
 //! - Signature (C11): in proportion to the total torque; sags or rises with the gravity torque of the pose.
 //! - Confused with: payload, and a stiffness where gravity does not act.
 
+use super::effect::ArmEffect;
 use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -35,6 +36,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct TorqueGain {
     gain: Joints,
 }
+
+impl ArmEffect for TorqueGain {}
 
 impl TorqueGain {
     pub(super) fn apply(&self, tau: &Joints) -> Joints {

@@ -7,6 +7,7 @@
 //! - Signature (C7): locked to the position, so its frequency is proportional to the speed.
 //! - Confused with: joint elasticity (a fixed frequency), noise.
 
+use super::effect::ArmEffect;
 use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -63,9 +64,10 @@ pub(in crate::effects) struct TorqueRipple {
     phase: Joints,
 }
 
-impl TorqueRipple {
-    /// Torque lost at a position [N m].
-    pub(super) fn torque(&self, joint: usize, q: f64) -> f64 {
+impl ArmEffect for TorqueRipple {
+    const IN_JOINTS: bool = true;
+
+    fn drag(&self, joint: usize, q: f64, _: f64) -> f64 {
         self.amplitude[joint] * (self.order[joint] * q + self.phase[joint]).sin()
     }
 }

@@ -6,6 +6,7 @@
 //! - Signature (C19): nothing below the limit, flat tops above; peaks only.
 //! - Confused with: voltage saturation (less in fast motion), torque gain (acts at every torque), command delay (in fast motion).
 
+use super::effect::ArmEffect;
 use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -40,6 +41,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct TorqueSaturation {
     limit: Joints,
 }
+
+impl ArmEffect for TorqueSaturation {}
 
 impl TorqueSaturation {
     pub(super) fn apply(&self, tau: &Joints) -> Joints {

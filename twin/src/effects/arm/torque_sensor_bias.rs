@@ -6,6 +6,7 @@
 //! - Signature (C22): constant in every pose and at every speed; the motion stays.
 //! - Confused with: friction asymmetry and payload (change the motion).
 
+use super::effect::ArmEffect;
 use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -41,6 +42,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct TorqueSensorBias {
     pub(super) bias: Joints,
 }
+
+impl ArmEffect for TorqueSensorBias {}
 
 #[cfg(test)]
 mod tests {

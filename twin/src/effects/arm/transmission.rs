@@ -3,7 +3,7 @@
 //! with play.
 
 use super::{ArmEffects, ArmMemory};
-use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, Passed, Presliding, Spring, Transmission};
+use crate::arm::{ArmModel, JointState, Joints, MAX_JOINTS, Passed, Presliding, Slip, Spring, Transmission};
 
 /// Longest step of a gear that yields [s]: a wrist link on its spring rings at up to 200 Hz.
 const LONGEST_STEP: f64 = 2.5e-4;
@@ -20,18 +20,6 @@ const SLOW_TO_BEND: f64 = 0.05;
 pub(super) const AT_REST: f64 = 1e-3;
 
 impl ArmEffects {
-    /// Whether friction or a gear that yields lies between motors and links.
-    pub(crate) fn acts_in_joints(&self) -> bool {
-        self.joint_coulomb_friction.is_some()
-            || self.joint_viscous_friction.is_some()
-            || self.joint_stribeck_friction.is_some()
-            || self.joint_friction_asymmetry.is_some()
-            || self.joint_load_friction.is_some()
-            || self.joint_presliding_friction.is_some()
-            || self.torque_ripple.is_some()
-            || self.yields()
-    }
-
     /// Whether motor and link of a joint may be at different positions.
     pub(crate) fn yields(&self) -> bool {
         self.joint_elasticity.is_some() || self.joint_backlash.is_some()
@@ -77,16 +65,16 @@ impl ArmEffects {
 
     /// Below this speed the dry friction of a joint changes within a few periods [rad/s]; 0 where it turns round at once.
     fn slow(&self, joint: usize) -> f64 {
-        let falls = self.joint_stribeck_friction.map_or(0.0, |effect| effect.falls_over(joint));
         let bends = if self.joint_presliding_friction.is_some() { SLOW_TO_BEND } else { 0.0 };
-        (SLOW * self.creep(joint).max(falls)).min(FAST).max(bends)
+        (SLOW * self.creep(joint).max(self.falls_over(joint))).min(FAST).max(bends)
     }
 
     /// How far bristles are bent where nothing is known of what was before: as far as keeps a joint at rest, wholly in motion.
     fn bent_at(&self, arm: &ArmModel, state: &JointState, (motor_torque, external): (&Joints, &Joints)) -> Joints {
         let bias = arm.bias(state);
         std::array::from_fn(|i| {
-            let bound = self.dry_friction(i, state.dq[i].abs(), motor_torque[i]);
+            let bound =
+                self.dry_friction(i, Slip { q: state.q[i], speed: state.dq[i].abs(), motor_torque: motor_torque[i] });
             let load = motor_torque[i] + external[i] - bias[i];
             match bound > 0.0 {
                 true if state.dq[i].abs() > AT_REST => state.dq[i].signum(),
@@ -106,11 +94,8 @@ impl Transmission for ArmEffects {
         }
     }
 
-    fn dry_friction(&self, joint: usize, speed: f64, motor_torque: f64) -> f64 {
-        self.joint_coulomb_friction.map_or(0.0, |effect| effect.coulomb[joint])
-            + self.joint_stribeck_friction.map_or(0.0, |effect| effect.level(joint, speed))
-            + self.joint_load_friction.map_or(0.0, |effect| effect.level(joint, motor_torque))
-            + self.joint_presliding_friction.map_or(0.0, |effect| effect.coulomb[joint])
+    fn dry_friction(&self, joint: usize, slip: Slip) -> f64 {
+        self.all_dry_friction(joint, slip)
     }
 
     fn presliding(&self, joint: usize) -> Option<Presliding> {
@@ -118,15 +103,10 @@ impl Transmission for ArmEffects {
     }
 
     fn creep(&self, joint: usize) -> f64 {
-        let coulomb = self.joint_coulomb_friction.map_or(0.0, |effect| effect.creep[joint]);
-        let stribeck = self.joint_stribeck_friction.map_or(0.0, |effect| effect.creep[joint]);
-        let load = self.joint_load_friction.map_or(0.0, |effect| effect.creep[joint]);
-        coulomb.max(stribeck).max(load)
+        self.largest_creep(joint)
     }
 
     fn drag(&self, joint: usize, q: f64, dq: f64) -> f64 {
-        self.joint_viscous_friction.map_or(0.0, |effect| effect.viscous[joint] * dq)
-            + self.joint_friction_asymmetry.map_or(0.0, |effect| effect.torque(joint, dq))
-            + self.torque_ripple.map_or(0.0, |effect| effect.torque(joint, q))
+        self.all_drag(joint, q, dq)
     }
 }

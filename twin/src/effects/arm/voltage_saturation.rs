@@ -8,6 +8,7 @@
 //! - Signature (C19): flat tops where errors are large, above all in fast motion; nothing below.
 //! - Confused with: torque saturation (the same at all speeds), torque gain.
 
+use super::effect::ArmEffect;
 use crate::arm::Joints;
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
@@ -51,6 +52,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 pub(in crate::effects) struct VoltageSaturation {
     limit: Joints,
 }
+
+impl ArmEffect for VoltageSaturation {}
 
 impl VoltageSaturation {
     /// `damped`: the controller's damping times the joints' velocities [N m].
