@@ -28,7 +28,6 @@ pub enum Target {
 pub struct Order<'a> {
     /// The task that the episodes are of.
     pub task: &'a Task,
-    /// Their clips.
     pub clips: &'a [PathBuf],
     /// What they become.
     pub to: Target,
@@ -41,7 +40,6 @@ pub struct Order<'a> {
 /// What was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Exported {
-    /// Episodes.
     pub episodes: usize,
     /// Frames of all of them.
     pub frames: usize,
@@ -68,7 +66,6 @@ pub enum ExportError {
     /// A clip does not go with the task.
     #[error("{}: {what}", file.display())]
     Clip {
-        /// The clip.
         file: PathBuf,
         /// What is wrong and what to do.
         what: String,

@@ -80,10 +80,8 @@ pub struct PumpReport {
 /// The pump could not start, or did not run to its end.
 #[derive(Debug, thiserror::Error)]
 pub enum PumpError {
-    /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// Its thread.
     #[error(transparent)]
     Thread(#[from] ThreadError),
     /// It stands still.
@@ -167,7 +165,6 @@ impl Pump {
     }
 
     /// The thread, to wake it.
-    #[must_use]
     pub fn thread(&self) -> Thread {
         self.handle.thread().clone()
     }

@@ -31,7 +31,6 @@ pub struct ReplayClock(Arc<AtomicU64>);
 
 impl ReplayClock {
     /// When a recorded stamp is replayed: monotonic clock [ns]; `None` before the arm has begun.
-    #[must_use]
     pub fn moment_of(&self, stamp_ns: u64) -> Option<u64> {
         // Wrapping: a bag's stamps are Unix time, far ahead of the monotonic clock.
         match self.0.load(Ordering::Relaxed) {
@@ -41,7 +40,6 @@ impl ReplayClock {
     }
 
     /// Sleeps until the replay has come to `stamp_ns`; `false` when it is to stop before.
-    #[must_use]
     pub fn wait_for(&self, stamp_ns: u64, stop: &AtomicBool) -> bool {
         loop {
             if stop.load(Ordering::Relaxed) {
@@ -66,7 +64,6 @@ impl ReplayClock {
 /// Poses that wait for the pump.
 const POSES: usize = 256;
 
-/// The recording.
 #[derive(Debug)]
 pub struct ReplayArm {
     clip: Clip,

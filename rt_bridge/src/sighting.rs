@@ -11,7 +11,6 @@ pub struct Sighting {
     pub is_first: bool,
     /// Its name; empty for the one object of a cell that names none.
     pub name: ObjectName,
-    /// The pose.
     pub pose: ObjectPose,
 }
 

@@ -9,17 +9,12 @@ pub enum ThreadError {
     /// The operating system makes none.
     #[error("cannot start the thread `{name}`: {source}; end other programs to free memory and processes")]
     Refused {
-        /// Its name.
         name: &'static str,
         /// The system's reason.
         source: std::io::Error,
     },
-    /// It panicked.
     #[error("the thread `{name}` failed; please report this with what it said on standard error")]
-    Failed {
-        /// Its name.
-        name: &'static str,
-    },
+    Failed { name: &'static str },
 }
 
 /// Starts `body` as the thread `name` and returns when it has sent its first word: what it opens belongs to the thread,

@@ -49,7 +49,6 @@ impl std::fmt::Display for Fault {
 
 impl Targets {
     /// For an arm.
-    #[must_use]
     pub fn new(model: ArmModel, limits: Limits) -> Self {
         Self { model, limits, waiting: VecDeque::with_capacity(STREAMS + 1), last: None, said: Said::default() }
     }

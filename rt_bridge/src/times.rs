@@ -22,7 +22,6 @@ impl Times {
     ///
     /// # Panics
     /// Never: the bounds are constants that the histogram accepts.
-    #[must_use]
     pub fn new() -> Self {
         Self(Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("constant bounds are valid"))
     }
@@ -32,14 +31,11 @@ impl Times {
         self.0.saturating_record(ns);
     }
 
-    /// Times counted.
-    #[must_use]
     pub fn count(&self) -> u64 {
         self.0.len()
     }
 
     /// Percentiles in microseconds; all `None` when nothing was counted.
-    #[must_use]
     pub fn percentiles(&self) -> Percentiles {
         let counted = |ns: u64| (!self.0.is_empty()).then_some(ns as f64 * 1e-3);
         let at = |quantile: f64| counted(self.0.value_at_quantile(quantile));
@@ -56,12 +52,10 @@ pub struct Percentiles {
     pub p99: Option<f64>,
     /// 99.9 % are shorter.
     pub p999: Option<f64>,
-    /// The longest.
     pub max: Option<f64>,
 }
 
 /// A time [us] for people.
-#[must_use]
 pub fn in_words(time_us: Option<f64>) -> String {
     time_us.map_or_else(|| "not measured".to_owned(), |us| format!("{us:.1} us"))
 }

@@ -64,13 +64,11 @@ pub enum BudgetError {
 
 impl Budget {
     /// Of an input of so many bytes, by the rule above.
-    #[must_use]
     pub fn of(bytes: u64) -> Self {
         Self::with(ROOM.max(bytes.saturating_mul(BYTES_OF_ONE)), STEPS.max(bytes.saturating_mul(STEPS_OF_ONE)))
     }
 
     /// Of so much memory [bytes] and so many steps, for what is no file.
-    #[must_use]
     pub fn with(memory: u64, steps: u64) -> Self {
         Self(Arc::new(Account { memory, steps, taken: AtomicU64::new(0), done: AtomicU64::new(0) }))
     }
@@ -122,14 +120,12 @@ impl Budget {
     }
 
     /// Bytes that may still be taken.
-    #[must_use]
     pub fn left(&self) -> u64 {
         self.0.memory - self.0.taken.load(Ordering::Relaxed)
     }
 }
 
 /// What a packed piece of so many bytes is believed to become at most [bytes]: a chunk of a bag.
-#[must_use]
 pub fn unpacked(packed: usize) -> u64 {
     PIECE.max((packed as u64).saturating_mul(PIECE_OF_ONE)).min(LARGEST_PIECE)
 }

@@ -4,7 +4,6 @@
 const LENGTH: usize = 4;
 
 /// The bytes with their checksum (CRC-32) behind them.
-#[must_use]
 pub fn with_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
     let sum = crc32fast::hash(&bytes);
     bytes.extend(sum.to_le_bytes());
@@ -12,7 +11,6 @@ pub fn with_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
 }
 
 /// What stands before the checksum; `None` where it is another one's.
-#[must_use]
 pub fn without_checksum(bytes: &[u8]) -> Option<&[u8]> {
     let (content, sum) = bytes.split_at_checked(bytes.len().checked_sub(LENGTH)?)?;
     (crc32fast::hash(content).to_le_bytes() == sum).then_some(content)

@@ -37,7 +37,6 @@ pub fn status(text: &str) {
 }
 
 /// `true` where a person may be reading.
-#[must_use]
 pub fn is_terminal() -> bool {
     static IS_TERMINAL: OnceLock<bool> = OnceLock::new();
     *IS_TERMINAL.get_or_init(|| io::stderr().is_terminal())

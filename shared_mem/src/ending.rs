@@ -15,7 +15,6 @@ pub fn ask() {
 }
 
 /// Whether the end was asked for.
-#[must_use]
 pub fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }

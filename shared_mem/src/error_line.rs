@@ -3,7 +3,6 @@
 use std::error::Error;
 
 /// What the error says, and of its causes those that it does not already say.
-#[must_use]
 pub fn error_line(error: &(dyn Error + 'static)) -> String {
     let (mut line, mut cause) = (error.to_string(), error.source());
     while let Some(error) = cause {

@@ -35,20 +35,17 @@ pub struct Pose<To, From> {
 
 impl<To, From> Pose<To, From> {
     /// The frames coincide.
-    #[must_use]
     pub fn identity() -> Self {
         Self::from_isometry(Isometry3::identity())
     }
 
     /// Names the frames of a raw transform: for physics, rendering and file formats, which speak raw transforms.
-    #[must_use]
     pub fn from_isometry(isometry: Isometry3<f64>) -> Self {
         Self { isometry, frames: PhantomData }
     }
 
     /// From a position in metres and a quaternion `w, x, y, z`, which is normalised. `None` when the quaternion has no
     /// direction or a number is not finite.
-    #[must_use]
     pub fn from_parts(position: [f64; 3], wxyz: [f64; 4]) -> Option<Self> {
         let finite = position.iter().chain(&wxyz).all(|v| v.is_finite());
         let q = Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
@@ -61,38 +58,32 @@ impl<To, From> Pose<To, From> {
     }
 
     /// The raw transform.
-    #[must_use]
     pub fn isometry(&self) -> Isometry3<f64> {
         self.isometry
     }
 
     /// Origin of `From` in `To` [m].
-    #[must_use]
     pub fn position(&self) -> [f64; 3] {
         self.isometry.translation.vector.into()
     }
 
     /// Rotation from `From` to `To` as `w, x, y, z`.
-    #[must_use]
     pub fn wxyz(&self) -> [f64; 4] {
         let q = self.isometry.rotation.quaternion();
         [q.w, q.i, q.j, q.k]
     }
 
     /// The transform the other way round.
-    #[must_use]
     pub fn inverse(&self) -> Pose<From, To> {
         Pose::from_isometry(self.isometry.inverse())
     }
 
     /// A point given in `From`, expressed in `To` [m].
-    #[must_use]
     pub fn transform_point(&self, point: &Point3<f64>) -> Point3<f64> {
         self.isometry.transform_point(point)
     }
 
     /// Angle of the rotation between this pose and another [rad], 0 to pi.
-    #[must_use]
     pub fn angle_to(&self, other: &Self) -> f64 {
         self.isometry.rotation.angle_to(&other.isometry.rotation)
     }

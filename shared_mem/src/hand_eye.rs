@@ -98,7 +98,6 @@ pub struct HandEye {
 
 impl MountedPose {
     /// A pose without intervals.
-    #[must_use]
     pub fn new(pose: &Isometry3<f64>) -> Self {
         let q = pose.rotation.quaternion();
         Self {
@@ -111,7 +110,6 @@ impl MountedPose {
     }
 
     /// The pose; `None` where the orientation has no direction or a number is not finite.
-    #[must_use]
     pub fn isometry(&self) -> Option<Isometry3<f64>> {
         Pose::<(), ()>::from_parts(self.position, self.orientation).map(|pose| pose.isometry())
     }
@@ -141,7 +139,6 @@ impl HandEye {
     ///
     /// # Panics
     /// Never: every field has a TOML form.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("numbers, strings, arrays and tables have a TOML form")
     }

@@ -49,7 +49,6 @@ pub enum Kind {
 
 impl Kind {
     /// The largest file of this kind that is read [bytes].
-    #[must_use]
     pub const fn limit(self) -> u64 {
         const MIB: u64 = 1 << 20;
         match self {

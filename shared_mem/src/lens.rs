@@ -44,13 +44,11 @@ impl Distortion {
     pub const NONE: Self = Self::Polynomial([0.0; 8]);
 
     /// Brown and Conrady's five numbers: k1, k2, p1, p2, k3.
-    #[must_use]
     pub const fn brown([k1, k2, p1, p2, k3]: [f64; 5]) -> Self {
         Self::Polynomial([k1, k2, p1, p2, k3, 0.0, 0.0, 0.0])
     }
 
     /// The five numbers, where they are all.
-    #[must_use]
     pub fn as_brown(&self) -> Option<[f64; 5]> {
         match *self {
             Self::Polynomial([k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]) => Some([k1, k2, p1, p2, k3]),
@@ -59,13 +57,11 @@ impl Distortion {
     }
 
     /// Whether it does anything.
-    #[must_use]
     pub fn is_bent(&self) -> bool {
         *self != Self::NONE
     }
 
     /// In another precision.
-    #[must_use]
     pub fn of<T: RealField + Copy>(&self) -> Distortion<T> {
         match self {
             Self::Polynomial(k) => Distortion::Polynomial(k.map(convert)),
@@ -75,7 +71,6 @@ impl Distortion {
 
     /// Where a pinhole would have seen what is seen at a place of the plane z = 1; `None` where no ray of the half-space before
     /// the camera lands there.
-    #[must_use]
     pub fn straight(&self, seen: [f64; 2]) -> Option<[f64; 2]> {
         match self {
             Self::Polynomial(_) if !self.is_bent() => Some(seen),
@@ -90,7 +85,6 @@ impl Distortion {
     }
 
     /// The same as a direction for every place: one that no ray reaches gets one almost across the axis.
-    #[must_use]
     pub fn direction(&self, seen: [f64; 2]) -> [f64; 2] {
         self.straight(seen).unwrap_or_else(|| seen.map(|v| v * FAR / seen[0].hypot(seen[1])))
     }

@@ -34,6 +34,7 @@
 //! | [`usage`] | help, and what is wrong with a command line |
 //! | [`quantity`] | numbers with a unit, as they are typed |
 //! | [`time`] | the clock that every stamp comes from |
+#![warn(missing_docs)]
 
 pub mod answer;
 mod blocks;

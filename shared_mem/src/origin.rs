@@ -58,7 +58,6 @@ pub enum Source {
 
 impl Origin {
     /// The robot at `host`; `None` for a text that is no address.
-    #[must_use]
     pub fn robot(host: &str) -> Option<Self> {
         let is_of_host = |c: char| c.is_ascii_alphanumeric() || "._-:[]%".contains(c);
         let is_host = !host.is_empty() && host.len() <= LONGEST_HOST && host.chars().all(is_of_host);
@@ -66,25 +65,21 @@ impl Origin {
     }
 
     /// A recording played back; of a path the last part. `None` without a name.
-    #[must_use]
     pub fn replay(clip: &str) -> Option<Self> {
         Some(Self::Replay { clip: shown(last_part(clip))? })
     }
 
     /// An imported log; of a path the last part. `None` without a name.
-    #[must_use]
     pub fn import(file: &str, format: &str) -> Option<Self> {
         Some(Self::Import { file: shown(last_part(file))?, format: shown(format).unwrap_or_else(|| "log".into()) })
     }
 
     /// The recording of another program in this format.
-    #[must_use]
     pub fn elsewhere(format: &str) -> Self {
         Self::Elsewhere { format: shown(format).unwrap_or_else(|| "log".into()) }
     }
 
     /// What it is beside others.
-    #[must_use]
     pub fn source(&self) -> Source {
         match self {
             Self::Simulation => Source::Simulation,
@@ -95,7 +90,6 @@ impl Origin {
     }
 
     /// The arm that records more of it, as `--arm` takes it; `None` where no bridge drives that arm.
-    #[must_use]
     pub fn arm(&self) -> Option<String> {
         match self {
             Self::Simulation => Some("sim".to_owned()),
@@ -163,7 +157,6 @@ impl Origins {
     }
 
     /// Whether nothing is known.
-    #[must_use]
     pub fn is_unknown(&self) -> bool {
         self.0.is_empty()
     }

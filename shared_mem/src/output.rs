@@ -134,13 +134,11 @@ impl Output {
     }
 
     /// The name that was asked for.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// Where the bytes lie until the end: for another program that writes them, or to read them back.
-    #[must_use]
     pub fn unfinished_path(&self) -> &Path {
         match &self.place {
             Place::Beside { temporary, .. } => temporary.path(),

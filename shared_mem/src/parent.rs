@@ -17,7 +17,6 @@ const LOOK: Duration = Duration::from_millis(20);
 const STACK: usize = 64 << 10;
 
 /// Whether process `parent` is not, or no longer, the parent of this one.
-#[must_use]
 pub fn is_gone(parent: u32) -> bool {
     parent_id() != parent
 }

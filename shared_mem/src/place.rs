@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf, absolute};
 
 /// `path` as it holds in every folder. However a file is spelt, it has one such path: its folder is the one that the system knows, with
 /// no link in it. A link at the end stays, since its name, and not that of what it leads to, says what kind of file it is.
-#[must_use]
 pub fn from_anywhere(path: &Path) -> PathBuf {
     // Of a file by its bare name, the parent has no name at all, and there is no absolute path to nothing.
     let named = if path.as_os_str().is_empty() { Path::new(".") } else { path };
@@ -16,7 +15,6 @@ pub fn from_anywhere(path: &Path) -> PathBuf {
 }
 
 /// `path` as a file in the folder of `file` may name it: from there where it lies there or below, else from anywhere.
-#[must_use]
 pub fn beside(file: &Path, path: &Path) -> PathBuf {
     let (file, path) = (from_anywhere(file), from_anywhere(path));
     let within = file.parent().and_then(|folder| path.strip_prefix(folder).ok()).map(Path::to_owned);

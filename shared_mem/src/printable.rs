@@ -4,13 +4,11 @@
 use std::fmt::Write as _;
 
 /// The text in one line: every control character, line breaks too, is written out, as `\u{1b}` or `\n`.
-#[must_use]
 pub fn one_line(text: &str) -> String {
     written_out(text, |_| false)
 }
 
 /// The text with its line breaks; every other control character is written out.
-#[must_use]
 pub fn lines(text: &str) -> String {
     written_out(text, |c| c == '\n')
 }

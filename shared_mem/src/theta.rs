@@ -100,7 +100,6 @@ pub struct EffectTheta {
 
 impl EffectTheta {
     /// The numbers of a parameter, one or many; `None` where it is not given or is none.
-    #[must_use]
     pub fn numbers(&self, parameter: &str) -> Option<Vec<f64>> {
         let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
         match self.parameters.get(parameter)? {
@@ -132,7 +131,6 @@ impl Theta {
     }
 
     /// With the object in question that `cell`'s is: the one of its name; where no name is given, on either side, the only one.
-    #[must_use]
     pub fn about(self, cell: &Cell) -> Self {
         let Self { arm, object, others, effects } = self;
         let mut all: Vec<ObjectTheta> = object.into_iter().chain(others).collect();
@@ -151,7 +149,6 @@ impl Theta {
     ///
     /// # Panics
     /// Never: every field has a TOML form.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string_pretty(self).expect("numbers, strings and arrays have a TOML form")
     }

@@ -13,21 +13,18 @@ pub const TICK: f64 = 1e-3;
 /// Nanoseconds of the machine's monotonic clock.
 ///
 /// `std::time::Instant` reads the same clock but hides its value, which two processes need to compare.
-#[must_use]
 pub fn now_ns() -> u64 {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
     u64::try_from(now.tv_sec).unwrap_or(0) * 1_000_000_000 + u64::try_from(now.tv_nsec).unwrap_or(0)
 }
 
 /// What has to be added to a monotonic stamp to get Unix time, as of now.
-#[must_use]
 pub fn unix_offset_ns() -> i64 {
     let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO);
     i64::try_from(unix.as_nanos()).unwrap_or(i64::MAX) - i64::try_from(now_ns()).unwrap_or(i64::MAX)
 }
 
 /// Seconds between two stamps, negative when `later` lies before `earlier`.
-#[must_use]
 pub fn seconds_between(earlier_ns: u64, later_ns: u64) -> f64 {
     if later_ns >= earlier_ns {
         (later_ns - earlier_ns) as f64 * 1e-9

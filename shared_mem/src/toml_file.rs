@@ -77,7 +77,6 @@ fn longer(given: &toml::Value, kept: &toml::Value, key: String) -> Option<String
 
 /// The text `before` with the values of `update`; everything else of it stays, blocks of other names too, but for the arrays of
 /// blocks in `whole`, which hold what `update` has of them and nothing else. `None` where one of the two is no TOML.
-#[must_use]
 pub fn updated(before: &str, update: &str, whole: &[&str]) -> Option<String> {
     let mut document: DocumentMut = before.parse().ok()?;
     let update: DocumentMut = update.parse().ok()?;

@@ -120,25 +120,21 @@ pub const TASK_JOINTS: &str = "/task/joints";
 pub const TASK_DRIVES: &str = "/task/drives";
 
 /// Recordings of several bodies: where the body of this name is.
-#[must_use]
 pub fn object_pose(name: &str) -> String {
     format!("/object/{name}/pose")
 }
 
 /// Recordings: the object of this name in the twin, and how far it is from the real one.
-#[must_use]
 pub fn twin_object(name: &str) -> String {
     format!("/twin/object/{name}")
 }
 
 /// Recordings of tasks: where the moved body of this name is commanded to be.
-#[must_use]
 pub fn object_target(name: &str) -> String {
     format!("/object/{name}/target")
 }
 
 /// The body that a topic of [`object_pose`] (`"pose"`) or of [`object_target`] (`"target"`) is about.
-#[must_use]
 pub fn object_of<'a>(topic: &'a str, what: &str) -> Option<&'a str> {
     topic.strip_prefix("/object/")?.strip_suffix(what)?.strip_suffix('/')
 }

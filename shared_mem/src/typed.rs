@@ -10,25 +10,21 @@ pub struct Command(String);
 
 impl Command {
     /// A program with its verbs, and options that need no quoting: `twin replay`.
-    #[must_use]
     pub fn new(verb: &str) -> Self {
         Self(verb.to_owned())
     }
 
     /// With a file or a folder.
-    #[must_use]
     pub fn path(self, path: &Path) -> Self {
         self.words(&quoted(path))
     }
 
     /// With an option whose value is a file or a folder.
-    #[must_use]
     pub fn option(self, flag: &str, path: &Path) -> Self {
         self.words(flag).path(path)
     }
 
     /// With the option where there is a value.
-    #[must_use]
     pub fn option_of(self, flag: &str, path: Option<&Path>) -> Self {
         match path {
             Some(path) => self.option(flag, path),
@@ -37,7 +33,6 @@ impl Command {
     }
 
     /// With words as they stand; nothing where there are none.
-    #[must_use]
     pub fn words(mut self, words: &str) -> Self {
         if !words.is_empty() {
             self.0.push(' ');
@@ -60,20 +55,17 @@ impl From<Command> for String {
 }
 
 /// The command that this program was started with, to be typed again.
-#[must_use]
 pub fn command() -> String {
     let words = std::env::args_os().map(|word| word_of(&word.to_string_lossy()));
     words.collect::<Vec<_>>().join(" ")
 }
 
 /// The same with one more word at its end, unless it is there already.
-#[must_use]
 pub fn with(word: &str, is_there: bool) -> String {
     if is_there { command() } else { format!("{} {word}", command()) }
 }
 
 /// A path as a shell takes it for one word that is no option.
-#[must_use]
 pub fn quoted(path: &Path) -> String {
     let text = path.to_string_lossy();
     if text.starts_with('-') { word_of(&format!("./{text}")) } else { word_of(&text) }

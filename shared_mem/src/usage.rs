@@ -6,7 +6,6 @@ use std::process::ExitCode;
 
 /// Says `text` and gives the exit code: arguments that are wrong, on standard error with 2; help or the version that was
 /// asked for, on standard output with 0, or 1 where that takes nothing.
-#[must_use]
 pub fn say(arguments_are_wrong: bool, text: impl Display) -> ExitCode {
     if arguments_are_wrong {
         console::block(text);

@@ -17,7 +17,6 @@ const JOINT_STATE: &str = "sensor_msgs/msg/JointState";
 /// Names of the two joints of the cell below.
 const NAMES: [&str; 2] = ["shoulder", "elbow"];
 
-/// CDR, little-endian.
 #[derive(Default)]
 struct Cdr(Vec<u8>);
 

@@ -7,7 +7,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The cell.toml that ships with the project.
-#[must_use]
 pub fn lab_cell() -> &'static str {
     include_str!("../../config/fr3_cell.toml")
 }
@@ -26,7 +25,6 @@ impl Cell {
     ///
     /// # Panics
     /// When the folder cannot be made.
-    #[must_use]
     pub fn shipped() -> Self {
         Self::with(lab_cell())
     }
@@ -35,7 +33,6 @@ impl Cell {
     ///
     /// # Panics
     /// When the folder cannot be made.
-    #[must_use]
     pub fn with(cell_toml: &str) -> Self {
         static TURN: Mutex<()> = Mutex::new(());
         static NEXT: AtomicU32 = AtomicU32::new(0);
@@ -47,13 +44,11 @@ impl Cell {
     }
 
     /// Domain of shared memory that its programs meet in.
-    #[must_use]
     pub fn domain(&self) -> &str {
         &self.domain
     }
 
     /// A path in the cell's folder.
-    #[must_use]
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -62,7 +57,6 @@ impl Cell {
     ///
     /// # Panics
     /// When the temporary folder's path is no UTF-8.
-    #[must_use]
     pub fn text(&self, name: &str) -> String {
         self.path(name).to_str().expect("a UTF-8 path").to_owned()
     }
@@ -99,7 +93,6 @@ impl Cell {
     ///
     /// # Panics
     /// When shared memory fails.
-    #[must_use]
     pub fn wait_for_states(&self, limit: Duration) -> bool {
         let node = shared_mem::transport::Node::open_in(&self.domain, "test").expect("shared memory");
         let states = node.subscriber(shared_mem::topics::ARM_STATE).expect("a place to read");
@@ -126,7 +119,6 @@ impl Cell {
     }
 
     /// Size of a file of the cell, 0 when it does not exist.
-    #[must_use]
     pub fn size(path: &Path) -> u64 {
         std::fs::metadata(path).map_or(0, |m| m.len())
     }

@@ -58,7 +58,6 @@ impl Judge {
     ///
     /// # Panics
     /// When the cell has no arm.
-    #[must_use]
     pub fn new(cell: &Cell) -> Self {
         let model = ArmModel::from_cell(cell).expect("a cell with an arm");
         Self {
@@ -74,13 +73,11 @@ impl Judge {
     }
 
     /// The worst ratio to each limit.
-    #[must_use]
     pub fn worst(&self) -> &BTreeMap<&'static str, f64> {
         &self.worst
     }
 
     /// The limits that were exceeded.
-    #[must_use]
     pub fn exceeded(&self) -> Vec<&'static str> {
         let allowed = |what: &str| 1.0 + if what.starts_with("state") { FOLLOWING } else { ROUNDING };
         self.worst.iter().filter(|(what, ratio)| **ratio > allowed(what)).map(|(what, _)| *what).collect()

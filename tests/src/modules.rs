@@ -63,7 +63,6 @@ fn needed(own: &[String], text: &str) -> Vec<Vec<String>> {
 }
 
 /// The module that a file of a package is, from the package's root on; `None` for a program of its own.
-#[must_use]
 pub fn module(file: &str) -> Option<Vec<String>> {
     let mut names: Vec<String> = file.strip_suffix(".rs")?.split('/').map(str::to_owned).collect();
     if names[0] == "bin" {
@@ -77,7 +76,6 @@ pub fn module(file: &str) -> Option<Vec<String>> {
 
 /// Who needs whom of the modules that stand beside each other, by the module that they stand in. A module's own ones belong
 /// to it: what they need it needs, and that they need it is no matter.
-#[must_use]
 pub fn needs(files: &[(Vec<String>, String)]) -> BTreeMap<Vec<String>, Needs> {
     let modules: BTreeSet<&[String]> =
         files.iter().flat_map(|(own, _)| (1..=own.len()).map(|length| &own[..length])).collect();
@@ -96,7 +94,6 @@ pub fn needs(files: &[(Vec<String>, String)]) -> BTreeMap<Vec<String>, Needs> {
 }
 
 /// What is left when whoever needs nothing that is left goes, and whom nobody needs: the circles.
-#[must_use]
 pub fn circles(mut needs: Needs) -> Needs {
     loop {
         let before = needs.len();

@@ -14,7 +14,6 @@ use std::time::{Duration, Instant};
 ///
 /// # Panics
 /// When the program was not built: the scenarios run with the whole workspace.
-#[must_use]
 pub fn program_path(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("this test's own path");
     let profile = test.ancestors().find(|p| p.join(name).is_file());
@@ -82,8 +81,6 @@ impl Program {
         Self { name: name.to_owned(), child, stdout, stderr }
     }
 
-    /// Process id.
-    #[must_use]
     pub fn pid(&self) -> u32 {
         self.child.id()
     }
@@ -103,7 +100,6 @@ impl Program {
     ///
     /// # Panics
     /// When it does not end within 20 s.
-    #[must_use]
     pub fn interrupt(self) -> Finished {
         self.end_by(Signal::INT)
     }
@@ -112,14 +108,12 @@ impl Program {
     ///
     /// # Panics
     /// When it does not end within 20 s.
-    #[must_use]
     pub fn end_by(self, signal: Signal) -> Finished {
         self.signal(signal);
         self.wait(Duration::from_secs(20))
     }
 
     /// Whether it has a handler for the signal.
-    #[must_use]
     pub fn listens_to(&self, signal: Signal) -> bool {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap_or_default();
         let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
@@ -131,7 +125,6 @@ impl Program {
     ///
     /// # Panics
     /// When it does not come within `limit`; the message holds what the program said.
-    #[must_use]
     pub fn wait(mut self, limit: Duration) -> Finished {
         let start = Instant::now();
         let status = loop {
@@ -173,7 +166,6 @@ impl Finished {
     ///
     /// # Panics
     /// When there is anything else: the message holds all the program said.
-    #[must_use]
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.stdout)
             .unwrap_or_else(|e| panic!("no JSON object ({e}) on stdout:\n{}\nstderr:\n{}", self.stdout, self.stderr))
@@ -183,7 +175,6 @@ impl Finished {
     ///
     /// # Panics
     /// When the program failed; the message holds what it said.
-    #[must_use]
     pub fn succeeded(self) -> Self {
         assert!(self.status.success(), "ended with {}:\n{}", self.status, self.stderr);
         self
@@ -193,7 +184,6 @@ impl Finished {
     ///
     /// # Panics
     /// When it ended otherwise.
-    #[must_use]
     pub fn complaint(&self) -> &str {
         assert_eq!(self.status.code(), Some(1), "expected exit code 1; it said:\n{}\n{}", self.stdout, self.stderr);
         self.stderr.trim_end().lines().last().unwrap_or("")

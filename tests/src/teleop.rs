@@ -15,7 +15,6 @@ use tungstenite::{Message, WebSocket};
 pub const LONG: Duration = Duration::from_secs(60);
 
 /// A task that ships.
-#[must_use]
 pub fn task(name: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../twin/tasks").join(name).display().to_string()
 }
@@ -33,7 +32,6 @@ impl Teleop {
     ///
     /// # Panics
     /// When it does not start.
-    #[must_use]
     pub fn start(arguments: &[&str]) -> Self {
         let mut child = Command::new(program_path("twin"))
             .args(["teleop", "--port", "0", "--json", "--parent", &std::process::id().to_string()])
@@ -61,7 +59,6 @@ impl Teleop {
     ///
     /// # Panics
     /// When it cannot be opened.
-    #[must_use]
     pub fn page(&self) -> Page {
         self.try_page().expect("a page")
     }
@@ -70,7 +67,6 @@ impl Teleop {
     ///
     /// # Panics
     /// When the system refuses what it always grants.
-    #[must_use]
     pub fn try_page(&self) -> Option<Page> {
         let (socket, _) = tungstenite::connect(format!("ws://127.0.0.1:{}/ws", self.port)).ok()?;
         if let MaybeTlsStream::Plain(tcp) = socket.get_ref() {
@@ -111,7 +107,6 @@ impl Teleop {
 /// What a browser would be.
 #[derive(Debug)]
 pub struct Page {
-    /// Its connection.
     pub socket: WebSocket<MaybeTlsStream<TcpStream>>,
     /// What came as text.
     pub texts: Vec<Value>,
@@ -183,7 +178,6 @@ impl Page {
 ///
 /// # Panics
 /// When it is none.
-#[must_use]
 pub fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().expect("an array").iter().map(|x| x.as_f64().expect("a number")).collect()
 }

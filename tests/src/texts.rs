@@ -5,14 +5,12 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The programs.
 pub const PROGRAMS: [&str; 3] = ["rt_bridge", "twin", "calibration"];
 
 /// The workspace's folder.
 ///
 /// # Panics
 /// When this crate lies in none.
-#[must_use]
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace").to_owned()
 }
@@ -30,7 +28,6 @@ pub struct Verb {
 
 impl Verb {
     /// Examples of the help: indented, beginning with the program, and whole where the help breaks a long one.
-    #[must_use]
     pub fn examples(&self) -> Vec<String> {
         let after = self.help.split_once("Example").map_or("", |(_, after)| after);
         let begin = format!("  {} ", self.path[0]);
@@ -54,7 +51,6 @@ impl Verb {
 ///
 /// # Panics
 /// When a program does not show its help.
-#[must_use]
 pub fn verbs() -> Vec<Verb> {
     let mut found = Vec::new();
     let mut open: Vec<Vec<String>> = PROGRAMS.iter().map(|program| vec![(*program).to_owned()]).collect();
@@ -82,7 +78,6 @@ fn section<'a>(help: &'a str, heading: &str) -> Vec<&'a str> {
 }
 
 /// Names of the flags that a text mentions, without their dashes.
-#[must_use]
 pub fn flags_in(text: &str) -> Vec<String> {
     let begins =
         |before: &str| before.ends_with(|c: char| c.is_whitespace() || "`(\"'".contains(c)) || before.is_empty();
@@ -97,7 +92,6 @@ pub fn flags_in(text: &str) -> Vec<String> {
 ///
 /// # Panics
 /// When one cannot be read.
-#[must_use]
 pub fn documents() -> Vec<(String, String)> {
     let docs = std::fs::read_dir(root().join("docs")).expect("docs").map(|entry| entry.expect("an entry").path());
     let all = docs.filter(|path| path.extension().is_some_and(|e| e == "md")).chain([root().join("README.md")]);
@@ -130,7 +124,6 @@ pub const PRODUCT: [&str; 14] = [
 ///
 /// # Panics
 /// When a source cannot be read.
-#[must_use]
 pub fn literals() -> Vec<(String, String)> {
     let mut found = Vec::new();
     let mut folders: Vec<PathBuf> = PRODUCT.map(|folder| root().join(folder)).into();
@@ -189,7 +182,6 @@ fn spaced(text: &str) -> String {
 }
 
 /// Pieces of code in a text: between backticks, and lines between fences.
-#[must_use]
 pub fn code_in(text: &str) -> Vec<String> {
     let mut found = Vec::new();
     for (number, part) in text.split("```").enumerate() {

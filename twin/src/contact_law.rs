@@ -19,7 +19,6 @@ pub const RESTITUTION: f64 = 0.25;
 
 impl ContactLaw {
     /// The nominal law with an object's friction.
-    #[must_use]
     pub fn nominal(friction: f64) -> Self {
         Self { stiffness: STIFFNESS, restitution: RESTITUTION, friction }
     }

@@ -13,7 +13,6 @@ const POINTS: u32 = 400;
 /// Root mean square over the rows of `predicted - measured`, per joint [rad].
 ///
 /// `measured` is row-major with `dof` columns; rows beyond the shorter of the two do not count.
-#[must_use]
 pub fn joint_rms(predicted: &[JointState], measured: &[f64], dof: usize) -> Joints {
     let mut sum = [0.0; MAX_JOINTS];
     let rows = predicted.iter().zip(measured.chunks_exact(dof.max(1)));
@@ -36,7 +35,6 @@ pub struct SurfacePoints {
 
 impl SurfacePoints {
     /// The same points every time for the same shape.
-    #[must_use]
     pub fn new(shape: &ObjectShape) -> Self {
         let (corners, triangles) = shape.triangles();
         let corner = |i: u32| corners[i as usize];
@@ -63,7 +61,6 @@ impl SurfacePoints {
     }
 
     /// ADD: mean distance between the same surface points under two poses [m].
-    #[must_use]
     pub fn add(&self, a: &Pose<Base, Object>, b: &Pose<Base, Object>) -> f64 {
         self.mean(a, b, |moved, own| (moved - own).norm())
     }
@@ -73,7 +70,6 @@ impl SurfacePoints {
     ///
     /// The closest one of the whole surface, not of a sample: between points a centimetre apart a slip of some
     /// millimetres finds no nearer neighbour than its own, and ADD-S would be ADD over again.
-    #[must_use]
     pub fn add_s(&self, a: &Pose<Base, Object>, b: &Pose<Base, Object>) -> f64 {
         let Some(surface) = &self.surface else { return 0.0 };
         self.mean(a, b, |moved, _| surface.distance(&moved))

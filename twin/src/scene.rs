@@ -21,7 +21,6 @@ use shared_mem::theta::{ObjectTheta, Theta};
 /// The object with every number a simulation needs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectModel {
-    /// Its surface.
     pub shape: ObjectShape,
     /// Mass [kg].
     pub mass: f64,
@@ -55,14 +54,12 @@ pub struct ObjectParameters {
 /// Surface of the object around its geometric centre, the origin of [`shared_mem::frames::Object`] [m].
 #[derive(Debug, Clone, PartialEq)]
 pub enum ObjectShape {
-    /// A box.
     Box {
         /// Half the edge lengths.
         half_extents: Vector3<f64>,
     },
     /// Triangles, moved so that the middle of their bounding box is the origin. Physics uses their convex hull.
     Mesh {
-        /// Corners.
         points: Vec<Point3<f64>>,
         /// Indices into `points`, counter-clockwise seen from outside.
         triangles: Vec<[u32; 3]>,
@@ -85,8 +82,6 @@ impl ObjectModel {
         Ok(Some(Self { shape, mass, centre_of_mass, friction, tip_friction, restitution, support: object.support }))
     }
 
-    /// Its parameters.
-    #[must_use]
     pub fn parameters(&self) -> ObjectParameters {
         let Self { mass, centre_of_mass, friction, tip_friction, restitution, .. } = *self;
         ObjectParameters { mass, centre_of_mass, friction, tip_friction, restitution }
@@ -112,9 +107,7 @@ impl ObjectModel {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("the object's {name} cannot be {value}; give {wanted}, in cell.toml or theta.toml")]
 pub struct ParameterError {
-    /// Which one.
     pub name: &'static str,
-    /// Its value.
     pub value: f64,
     /// What would do.
     pub wanted: &'static str,
@@ -143,7 +136,6 @@ impl ObjectParameters {
     }
 
     /// What `theta` knows, else the nominal values: `centre_of_mass` ([`nominal_centre_of_mass`]) and those of cell.toml.
-    #[must_use]
     pub fn new(object: &Object, centre_of_mass: Vector3<f64>, theta: Option<&Theta>) -> Self {
         // A block of another name is about another object.
         let fits = |known: &&ObjectTheta| known.name.is_none() || known.name == object.name;
@@ -161,7 +153,6 @@ impl ObjectParameters {
 
 /// Where the centre of mass of an object is taken to be while nobody knows, from the geometric centre [m]: where evenly spread mass
 /// has it; along an axis along which `centre_of_mass_range` excludes that, in the middle of the range.
-#[must_use]
 pub fn nominal_centre_of_mass(object: &Object, shape: &ObjectShape) -> Vector3<f64> {
     let mut centre = shape.centroid();
     for (value, [low, high]) in centre.iter_mut().zip(object.centre_of_mass_range.into_iter().flatten()) {
@@ -174,7 +165,6 @@ pub fn nominal_centre_of_mass(object: &Object, shape: &ObjectShape) -> Vector3<f
 
 impl ObjectShape {
     /// Centroid of the volume, from the geometric centre [m]; of a surface that encloses none, the geometric centre.
-    #[must_use]
     pub fn centroid(&self) -> Vector3<f64> {
         match self {
             Self::Box { .. } => Vector3::zeros(),
@@ -183,7 +173,6 @@ impl ObjectShape {
     }
 
     /// Half the size of the bounding box [m].
-    #[must_use]
     pub fn half_extents(&self) -> Vector3<f64> {
         match self {
             Self::Box { half_extents } => *half_extents,
@@ -192,7 +181,6 @@ impl ObjectShape {
     }
 
     /// Radius of a sphere around the geometric centre that holds the object [m].
-    #[must_use]
     pub fn bounding_radius(&self) -> f64 {
         match self {
             Self::Box { half_extents } => half_extents.norm(),
@@ -201,7 +189,6 @@ impl ObjectShape {
     }
 
     /// Corners and triangles of the surface, counter-clockwise seen from outside.
-    #[must_use]
     pub fn triangles(&self) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
         match self {
             Self::Box { half_extents } => box_triangles(*half_extents),

@@ -25,7 +25,6 @@ impl Default for Document {
 
 impl Document {
     /// One with nothing but its declaration.
-    #[must_use]
     pub fn new() -> Self {
         let mut document = Self { writer: Writer::new_with_indent(Vec::new(), b' ', 2), open: Vec::new() };
         document.write(Event::Decl(quick_xml::events::BytesDecl::new("1.0", Some("UTF-8"), None)));
@@ -83,7 +82,6 @@ impl Document {
     }
 
     /// Ends what is open; the text.
-    #[must_use]
     pub fn finish(mut self) -> String {
         while !self.open.is_empty() {
             self.close();

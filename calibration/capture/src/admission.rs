@@ -26,7 +26,6 @@ pub enum AdmissionError {
     /// Nobody said which arm.
     #[error("{} has clips of {origin}: say which arm records more, {remedy}", folder.display())]
     WhichArm {
-        /// The session.
         folder: PathBuf,
         /// Where its clips come from, in words.
         origin: String,
@@ -41,7 +40,6 @@ pub enum AdmissionError {
     Mixed {
         /// Where the new clips would come from.
         new: Origin,
-        /// The session.
         folder: PathBuf,
         /// Where its clips come from, in words.
         known: String,
@@ -52,7 +50,6 @@ pub enum AdmissionError {
 
 impl Admission {
     /// To the session in `folder`, which need not be there; `mix`: of every arm.
-    #[must_use]
     pub fn to(folder: &Path, mix: bool) -> Self {
         let session = Session::open(folder).ok();
         let known = session.as_ref().map_or_else(Provenance::default, Provenance::of);

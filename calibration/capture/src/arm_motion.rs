@@ -6,7 +6,6 @@ use super::request::Kind;
 /// Clips of one kind of motion, in which the arm moves alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmMotion {
-    /// Which.
     pub kind: Kind,
     /// How many clips.
     pub clips: usize,
@@ -18,13 +17,11 @@ pub struct ArmMotion {
 
 impl ArmMotion {
     /// Clips as usual.
-    #[must_use]
     pub const fn of(kind: Kind, clips: usize) -> Self {
         Self { kind, clips, amplitude: None, speed: 1.0 }
     }
 
     /// Arguments that record it.
-    #[must_use]
     pub fn arguments(&self) -> String {
         let kind = match self.kind {
             Kind::Multisine => String::new(),
@@ -38,7 +35,6 @@ impl ArmMotion {
     }
 
     /// The motion of one clip in words.
-    #[must_use]
     pub fn in_words(&self) -> String {
         let (seconds, amplitude) = self.kind.usual();
         let (seconds, amplitude) = (seconds / self.speed, self.amplitude.unwrap_or(amplitude));

@@ -37,7 +37,6 @@ pub(super) struct Around {
     node: Node,
 }
 
-/// A body.
 #[derive(Debug)]
 struct Other {
     name: ObjectName,
@@ -125,7 +124,6 @@ impl Around {
     }
 
     /// All of them.
-    #[must_use]
     pub(super) fn obstacles(&self) -> Vec<Obstacle> {
         self.others.iter().map(Other::obstacle).collect()
     }

@@ -32,19 +32,15 @@ impl Body {
     }
 
     /// The same with a camera on its flange.
-    #[must_use]
     pub fn with_camera(self, flange_from_camera: Isometry3<f64>) -> Self {
         Self { camera: Some(flange_from_camera), ..self }
     }
 
-    /// The arm.
-    #[must_use]
     pub fn model(&self) -> &ArmModel {
         &self.model
     }
 
     /// Height of the lowest point of flange and tool above the base frame's origin [m]; infinite where the arm's geometry is not known.
-    #[must_use]
     pub fn lowest_point(&self, q: &Joints) -> f64 {
         if !self.model.has_geometry() {
             return f64::INFINITY;
@@ -59,7 +55,6 @@ impl Body {
 
     /// Balls that fill flange, tool, camera and the links behind the shoulder, centre and radius [m]; none where the arm's geometry is not
     /// known. Of an arm unlike an FR3 the links are lines between its joints.
-    #[must_use]
     pub fn balls(&self, q: &Joints) -> Vec<(Point3<f64>, f64)> {
         let Some(hull) = &self.hull else { return Vec::new() };
         let balls: Vec<(usize, Point3<f64>, f64)> =
@@ -85,7 +80,6 @@ impl Body {
     }
 
     /// Torque that moves the arm like this, `M(q) ddq + bias(q, dq)` with gravity and rotors [N m].
-    #[must_use]
     pub fn torque(&self, state: &JointState, ddq: &Joints) -> Joints {
         let mass = self.model.mass_matrix(&state.q);
         let mut tau = self.model.bias(state);

@@ -49,7 +49,6 @@ pub enum BridgeError {
 /// Which bridge to start where none runs.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
-    /// cell.toml.
     pub cell: &'a Path,
     /// The arm; default: what the session admits.
     pub arm: Option<&'a str>,
@@ -113,7 +112,6 @@ impl Bridge {
     }
 
     /// Where what it records comes from; `None` where it does not say.
-    #[must_use]
     pub fn origin(&self) -> Option<&Origin> {
         self.origin.as_ref()
     }
@@ -160,7 +158,6 @@ impl Bridge {
     }
 
     /// `true` when it was started for this capture.
-    #[must_use]
     pub fn is_own(&self) -> bool {
         self.started.is_some()
     }

@@ -38,7 +38,6 @@ struct Swing {
 impl Chirp {
     /// From the lower to the higher of `frequency` [Hz] in `duration` [s], with excursions up to `amplitude` [rad]; `seed`
     /// draws the phases.
-    #[must_use]
     pub fn draw(frequency: [f64; 2], amplitude: f64, duration: f64, seed: u64, limits: &[JointLimits]) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let swing = |limit: &JointLimits| Swing {
@@ -51,7 +50,6 @@ impl Chirp {
     }
 
     /// Excursion of `joint` at `t` [s] and its derivatives [rad].
-    #[must_use]
     pub fn at(&self, joint: usize, t: f64) -> Jet {
         let Swing { phase, corner } = self.joints[joint];
         let k = self.growth;

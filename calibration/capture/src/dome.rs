@@ -60,7 +60,6 @@ const AWAY: f64 = 0.5;
 const LOOK: usize = 20;
 
 /// A camera at `from` that looks at `at`, its rows level but for a `roll` about its own axis.
-#[must_use]
 pub fn looking(from: &Point3<f64>, at: &Point3<f64>, roll: f64) -> Isometry3<f64> {
     let forwards = (at - from).normalize();
     let right = forwards.cross(&Vector3::z());
@@ -73,7 +72,6 @@ pub fn looking(from: &Point3<f64>, at: &Point3<f64>, roll: f64) -> Isometry3<f64
 impl Dome<'_> {
     /// At most `wanted` views spread over the dome, of those to which a straight way leads from `start` inside every limit: from any
     /// of them that is free each other one is reached over there.
-    #[must_use]
     pub fn views(&self, body: &Body, limits: &[JointLimits], start: &Joints, wanted: usize) -> Views {
         let reached = self.places(TRIED * wanted).filter_map(|place| {
             let view = self.view(body, limits, start, &place)?;
@@ -189,7 +187,6 @@ impl Dome<'_> {
 }
 
 /// How far joints are from one another [rad].
-#[must_use]
 pub fn apart(a: &Joints, b: &Joints) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }

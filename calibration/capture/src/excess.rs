@@ -23,13 +23,10 @@ pub enum Quantity {
 
 impl Quantity {
     /// Whether the same way, taken more slowly, comes with less of it.
-    #[must_use]
     pub fn eases(self) -> bool {
         !matches!(self, Self::Position | Self::Travel | Self::Height)
     }
 
-    /// Its unit.
-    #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
             Self::Position => "rad",
@@ -62,7 +59,6 @@ pub struct Excess {
     pub joint: Option<usize>,
     /// What is too large or too low.
     pub quantity: Quantity,
-    /// Its value.
     pub value: f64,
     /// What it may be at most (position and height: or at least).
     pub limit: f64,

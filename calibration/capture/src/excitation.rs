@@ -48,7 +48,6 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// One clip.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ClipSummary {
     /// File, relative to the session.
@@ -57,7 +56,6 @@ pub struct ClipSummary {
     pub motion: String,
     /// `true`: entered into cell.toml. A clip that is not stays on disk.
     pub kept: bool,
-    /// Why not.
     pub why: Option<String>,
     /// `true`: the user paused it, so another takes its place.
     pub paused: bool,
@@ -332,7 +330,6 @@ fn summary(file: PathBuf, why: Option<String>, plan: Plan, quality: Quality, rec
 
 impl ClipSummary {
     /// The clip's quality in a line.
-    #[must_use]
     pub fn line(&self) -> String {
         let Quality { lost_packets, peak_speed, tracking_error, .. } = self.quality;
         let verdict = match &self.why {

@@ -116,13 +116,11 @@ impl Hold {
     }
 
     /// Length [s].
-    #[must_use]
     pub fn duration(&self) -> f64 {
         self.duration
     }
 
     /// Excursion of `joint` at `t` [s] and its derivatives [rad].
-    #[must_use]
     pub fn at(&self, joint: usize, t: f64) -> Jet {
         let Move { begin, duration, from, to } =
             self.moves[self.moves.partition_point(|m| m.begin <= t).saturating_sub(1)];

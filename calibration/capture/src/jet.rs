@@ -5,7 +5,6 @@ pub type Jet = [f64; 4];
 
 /// `10 u³ - 15 u⁴ + 6 u⁵` and its derivatives in time where `du/dt = rate`; 0 before and 1 after. Its first and second
 /// derivative are 0 at both ends.
-#[must_use]
 pub fn quintic(u: f64, rate: f64) -> Jet {
     let u = u.clamp(0.0, 1.0);
     [
@@ -17,13 +16,11 @@ pub fn quintic(u: f64, rate: f64) -> Jet {
 }
 
 /// Integral over `u` of the value of [`quintic`] from 0; 1/2 at `u = 1`.
-#[must_use]
 pub fn swept(u: f64) -> f64 {
     u.powi(4) * (2.5 + u * (u - 3.0))
 }
 
 /// Product rule up to the third derivative.
-#[must_use]
 pub fn product(a: Jet, b: Jet) -> Jet {
     [
         a[0] * b[0],
@@ -35,7 +32,6 @@ pub fn product(a: Jet, b: Jet) -> Jet {
 
 /// A window over a motion of so many seconds: rises along a quintic for `rise` seconds, stays at 1, falls along the mirrored
 /// one; speed and acceleration are 0 at both ends.
-#[must_use]
 pub fn window(t: f64, duration: f64, rise: f64) -> Jet {
     if t < rise {
         quintic(t / rise, 1.0 / rise)

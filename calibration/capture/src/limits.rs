@@ -12,7 +12,6 @@ use twin::arm::{JointLimits, JointState, Limits};
 pub const SHARE: f64 = 0.9;
 
 /// Limits of the cell's arm, joint by joint.
-#[must_use]
 pub fn of(cell: &Cell, body: &Body) -> Vec<JointLimits> {
     Limits::of(cell, body.model()).counted().copied().collect()
 }
@@ -28,7 +27,6 @@ pub(crate) fn shipped() -> (Body, Vec<JointLimits>) {
 }
 
 /// The first limit that set points, one a control cycle, break; torque is asked of a body where there is one.
-#[must_use]
 pub fn first_excess(points: &[SetPoint], limits: &[JointLimits], body: Option<&Body>) -> Option<Excess> {
     points.windows(3).find_map(|w| {
         let [before, now, after] = [&w[0], &w[1], &w[2]];

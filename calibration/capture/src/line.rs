@@ -18,7 +18,6 @@ const TURN_STEP: f64 = 0.15;
 const SHORTEST: f64 = 0.2;
 
 /// Joints that bring the tool's end to `target`, the nearest ones to `from`; `None` out of reach.
-#[must_use]
 pub fn reach(body: &Body, from: &Joints, target: &Isometry3<f64>) -> Option<Joints> {
     let tip = Isometry3::translation(0.0, 0.0, body.model().tool_length());
     body.model().reach(from, &tip, target)
@@ -26,7 +25,6 @@ pub fn reach(body: &Body, from: &Joints, target: &Isometry3<f64>) -> Option<Join
 
 /// Joints that bring the tool's end to `target` after turning it about its own axis by `turn` [rad], step by step, so that
 /// the arm goes round the shorter way and no other; `None` out of reach.
-#[must_use]
 pub fn reach_turned(body: &Body, from: &Joints, target: &Isometry3<f64>, turn: f64) -> Option<Joints> {
     let steps = (turn.abs() / TURN_STEP).ceil() as u32;
     let turned = |k: u32| {
@@ -38,13 +36,11 @@ pub fn reach_turned(body: &Body, from: &Joints, target: &Isometry3<f64>, turn: f
 }
 
 /// A turn about the tool's own axis [rad].
-#[must_use]
 pub fn about_itself(turn: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn)
 }
 
 /// Joint velocities that move the tool's end with `velocity` [m/s] and turn it nowhere.
-#[must_use]
 pub fn joint_velocity(body: &Body, q: &Joints, velocity: &Vector3<f64>) -> Joints {
     joints_for(body, q, &Vector6::new(velocity.x, velocity.y, velocity.z, 0.0, 0.0, 0.0))
 }
@@ -56,7 +52,6 @@ fn joints_for(body: &Body, q: &Joints, motion: &Vector6<f64>) -> Joints {
 
 /// A straight way of the tool's end to `end` from rest to rest at most at `speed` [m/s], the tool's direction turning on the
 /// way; `None` when it leaves the working space.
-#[must_use]
 pub fn travel(body: &Body, from: &Joints, end: &Isometry3<f64>, speed: f64) -> Option<Vec<SetPoint>> {
     let start = body.model().tip(from).isometry();
     let shift = end.translation.vector - start.translation.vector;

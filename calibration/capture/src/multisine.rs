@@ -36,7 +36,6 @@ struct Sine {
 impl Multisine {
     /// Draws amplitudes and phases for `dof` joints from `seed`. Amplitudes fall as 1/frequency, so that every sine
     /// brings about the same speed.
-    #[must_use]
     pub fn draw(dof: usize, duration: f64, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let joints = (0..dof)
@@ -63,7 +62,6 @@ impl Multisine {
     }
 
     /// Value and derivatives of `joint` at time `t` [s].
-    #[must_use]
     pub fn at(&self, joint: usize, t: f64) -> Jet {
         let mut sum = [0.0; 4];
         for Sine { amplitude, omega, phase } in self.joints[joint] {

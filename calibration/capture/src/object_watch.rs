@@ -34,7 +34,6 @@ pub enum WatchError {
     /// Shared memory failed.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// Nobody tracks.
     #[error(
         "no object poses arrive on /object/pose; start the tracker, or the bridge with a cell.toml that has [object], then start again"
     )]
@@ -94,7 +93,6 @@ struct Seen {
 /// How a clip's poses were.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct PoseQuality {
-    /// Poses received.
     pub poses: usize,
     /// Poses that should have been there and were not.
     pub lost_poses: usize,
@@ -236,13 +234,11 @@ impl ObjectWatch {
     }
 
     /// How the poses since [`Self::begin`] were.
-    #[must_use]
     pub fn quality(&self) -> PoseQuality {
         quality(&self.seen)
     }
 
     /// The other objects, where they were seen last.
-    #[must_use]
     pub fn obstacles(&self) -> Vec<Obstacle> {
         let at = |other: &Other| Some(Obstacle::at(other.name.text(), &other.corners, other.pose.as_ref()?));
         self.others.iter().filter_map(at).collect()
@@ -250,7 +246,6 @@ impl ObjectWatch {
 
     /// The bodies of the other objects by name, where each was seen last: the mean of place and heading over its
     /// last poses.
-    #[must_use]
     pub fn others(&self) -> Vec<(ObjectName, Isometry3<f64>)> {
         let of = |other: &Other| {
             let last = other.pose?;
@@ -264,7 +259,6 @@ impl ObjectWatch {
     }
 
     /// Those of the other objects that moved since [`Self::begin`]: name, how far [m], and how far they turned [rad].
-    #[must_use]
     pub fn also_moved(&self) -> Vec<(String, f64, f64)> {
         let of = |other: &Other| {
             let [far, turned] = between_ends(&other.seen)?;

@@ -34,7 +34,6 @@ pub struct Obstacle {
 /// Something would come too near to an obstacle.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub struct Blocked {
-    /// What would.
     pub what: String,
     /// The obstacle's name.
     pub name: String,
@@ -47,7 +46,6 @@ pub struct Blocked {
 }
 
 /// Corners of the box around a body along its own axes.
-#[must_use]
 pub fn corners(body: &CellBody) -> [Point3<f64>; 8] {
     let (points, _) = body.surface().triangles();
     let bound = |axis: usize, pick: fn(f64, f64) -> f64| points.iter().map(|p| p[axis]).reduce(pick).unwrap_or(0.0);
@@ -59,21 +57,17 @@ pub fn corners(body: &CellBody) -> [Point3<f64>; 8] {
 
 impl Obstacle {
     /// The obstacle of this name whose box has `corners` in its own axes, at `pose`.
-    #[must_use]
     pub fn at(name: &str, corners: &[Point3<f64>], pose: &Isometry3<f64>) -> Self {
         let corners: Vec<Point3<f64>> = corners.iter().map(|corner| pose * corner).collect();
         let top = corners.iter().map(|corner| corner.z).fold(f64::NEG_INFINITY, f64::max);
         Self { name: name.to_owned(), outline: outline(corners.iter().map(Point3::xy).collect()), top }
     }
 
-    /// Its name.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Corners of its outline from above, counter-clockwise.
-    #[must_use]
     pub fn outline(&self) -> &[Point2<f64>] {
         &self.outline
     }
@@ -102,7 +96,6 @@ impl Obstacle {
     }
 
     /// Gap between the obstacle and a ball, negative where they overlap [m]; and the direction that leads away from it.
-    #[must_use]
     pub fn gap(&self, centre: &Point3<f64>, radius: f64) -> (f64, Vector2<f64>) {
         let ((beside, away), above) = (self.beside(&centre.xy()), centre.z - self.top);
         let gap = if above <= 0.0 {
@@ -123,14 +116,12 @@ impl Obstacle {
 }
 
 /// Height of the highest obstacle; `None` without any.
-#[must_use]
 pub fn highest(obstacles: &[Obstacle]) -> Option<f64> {
     obstacles.iter().map(|obstacle| obstacle.top).reduce(f64::max)
 }
 
 /// Where arm or tool come too near to an obstacle on a motion; the worst place. `leaves`: where the motion begins too near, it
 /// may go away from there.
-#[must_use]
 pub fn on_motion(obstacles: &[Obstacle], body: &Body, points: &[SetPoint], leaves: bool) -> Option<Blocked> {
     let first = body.balls(&points.first().filter(|_| !obstacles.is_empty())?.q_d);
     let kept = |obstacle: &Obstacle| if leaves { KEPT.min(obstacle.gap_to_arm(&first).0 - NEARER) } else { KEPT };
@@ -153,7 +144,6 @@ pub fn on_motion(obstacles: &[Obstacle], body: &Body, points: &[SetPoint], leave
 }
 
 /// Where something of this radius that slides straight on comes too near to an obstacle; the worst place. `what`: its name.
-#[must_use]
 pub fn on_slide(obstacles: &[Obstacle], what: &str, [from, to]: [[f64; 2]; 2], radius: f64) -> Option<Blocked> {
     let (from, to) = (Point2::from(from), Point2::from(to));
     let length = (to - from).norm();
@@ -172,7 +162,6 @@ pub fn on_slide(obstacles: &[Obstacle], what: &str, [from, to]: [[f64; 2]; 2], r
 
 /// What stands between a camera and the ball of `radius` [m] around the point that it looks at; the worst. What reaches into that
 /// ball is a part of what is looked at.
-#[must_use]
 pub fn on_sight(obstacles: &[Obstacle], camera: &Point3<f64>, at: &Point3<f64>, radius: f64) -> Option<Blocked> {
     let way = at - camera;
     let steps = (way.norm() / STEP).ceil().max(1.0) as usize;
@@ -192,14 +181,12 @@ pub fn on_sight(obstacles: &[Obstacle], camera: &Point3<f64>, at: &Point3<f64>, 
 }
 
 /// The one that lacks more.
-#[must_use]
 pub fn worse(a: Blocked, b: Blocked) -> Blocked {
     if b.lacks() > a.lacks() { b } else { a }
 }
 
 impl Blocked {
     /// How much farther away the obstacle would have to be [m].
-    #[must_use]
     pub fn lacks(&self) -> f64 {
         self.kept - self.gap
     }

@@ -57,7 +57,6 @@ pub fn paced(points: &[SetPoint], factor: f64, limits: &[JointLimits], body: &Bo
 }
 
 /// The largest factor at which `points`, one a control cycle, break no limit; 0 where they break one at any pace.
-#[must_use]
 pub fn largest(points: &[SetPoint], limits: &[JointLimits], body: &Body) -> f64 {
     let of_moment = |w: &[SetPoint]| {
         let [before, now, after] = [&w[0], &w[1], &w[2]];
@@ -92,7 +91,6 @@ fn ratio(room: f64, much: f64) -> f64 {
 
 /// Set points one a control cycle of what was at `rows` at `times` [cycles], played at `factor` times its speed. Between two
 /// rows the course is the cubic with their positions and speeds; where a cycle falls on a row it is that row.
-#[must_use]
 pub fn resampled(times: &[f64], rows: &[SetPoint], factor: f64) -> Vec<SetPoint> {
     let (Some(first), Some(last)) = (times.first(), times.last()) else { return Vec::new() };
     let cycles = ((last - first) / factor).ceil() as usize;

@@ -10,7 +10,6 @@ const SCALE: f64 = 1400.0;
 const AROUND: f64 = 0.24;
 
 /// The picture as an SVG file: x of the base frame upwards, y to the left, as seen from behind the robot.
-#[must_use]
 pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> String {
     let stroke = &next.stroke;
     let [x0, y0] = stroke.object;

@@ -59,13 +59,11 @@ impl Placing<'_> {
     }
 
     /// Whether this capture has started the simulated cell itself.
-    #[must_use]
     pub fn simulates(&self) -> bool {
         self.bridge.is_own() && self.task.arm.as_deref().is_none_or(|arm| arm == "sim")
     }
 
     /// The cell as the simulated bridge reads it first.
-    #[must_use]
     pub fn simulated(cell: &Cell) -> Cell {
         Cell { clips: Vec::new(), ..cell.at_home_anywhere() }
     }

@@ -38,7 +38,6 @@ pub struct Plan {
 
 impl Plan {
     /// What is streamed of it.
-    #[must_use]
     pub fn motion(&self) -> Motion<'_> {
         Motion { set_points: &self.set_points, dof: self.dof }
     }
@@ -103,13 +102,11 @@ pub fn plan(request: &Request, limits: &[JointLimits], body: &Body) -> Result<Pl
 }
 
 /// Largest speed of any joint [rad/s].
-#[must_use]
 pub fn peak_speed(set_points: &[SetPoint]) -> f64 {
     set_points.iter().flat_map(|p| p.dq_d).fold(0.0, |peak: f64, dq| peak.max(dq.abs()))
 }
 
 /// Which limit the arm breaks where it stands still in a pose.
-#[must_use]
 pub fn rest_excess(q: &Joints, floor: f64, limits: &[JointLimits], body: &Body) -> Option<Excess> {
     let beyond = q.iter().zip(limits).enumerate().find_map(|(joint, (&q, limits))| position_excess(joint, q, limits));
     beyond.or_else(|| pose_excess(&JointState::at_rest(*q), &[0.0; MAX_JOINTS], floor, limits, body))

@@ -35,7 +35,6 @@ pub enum ProcessError {
         "cannot find the program `{name}`; build it with `cargo build --release -p {package}`, or put its folder on the PATH"
     )]
     Missing {
-        /// The program.
         name: &'static str,
         /// The package that builds it.
         package: &'static str,
@@ -43,7 +42,6 @@ pub enum ProcessError {
     /// The system would not start or watch it.
     #[error("cannot run {}: {source}; check that the file is executable", path.display())]
     Start {
-        /// The file.
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
@@ -53,7 +51,6 @@ pub enum ProcessError {
     Ended {
         /// The program and its verb.
         name: String,
-        /// How.
         status: ExitStatus,
         /// Its last words on stderr in a line, after a colon; empty where there are none worth telling.
         words: String,
@@ -83,7 +80,6 @@ pub enum Program {
 
 impl Program {
     /// The binary's name, which is its package's name too.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Bridge => "rt_bridge",
@@ -121,7 +117,6 @@ pub struct Running {
 }
 
 /// Arguments from anything that is text or a path.
-#[must_use]
 pub fn arguments<const N: usize>(list: [&dyn AsRef<std::ffi::OsStr>; N]) -> Vec<OsString> {
     list.iter().map(|a| a.as_ref().to_owned()).collect()
 }

@@ -54,7 +54,6 @@ pub struct Wish {
 
 impl Wish {
     /// The wish for a clip by its number in the session, from 0.
-    #[must_use]
     pub fn of_clip(number: usize) -> Self {
         let turn = if number.is_multiple_of(ANCHOR) { 0 } else { number };
         let at = |dimension: i32| (0.5 + turn as f64 * GOLDEN.powi(-dimension)).fract();
@@ -79,9 +78,7 @@ pub struct Standing {
 /// What can be struck, and by what.
 #[derive(Debug, Clone, Copy)]
 pub struct Program<'a> {
-    /// The arm.
     pub body: &'a Body,
-    /// Its limits.
     pub limits: &'a [JointLimits],
     /// Edge lengths of the object [m].
     pub size: [f64; 3],
@@ -104,7 +101,6 @@ pub struct Program<'a> {
 pub struct Next {
     /// What it is.
     pub stroke: Stroke,
-    /// Its motion.
     pub plan: StrokePlan,
     /// The way to where it begins.
     pub approach: Vec<SetPoint>,
@@ -142,7 +138,6 @@ pub enum NoStroke {
 
 impl NoStroke {
     /// Of what other objects are in the way of, the one that lacks least; `None` where they are in the way of nothing.
-    #[must_use]
     pub fn least(refused: impl Iterator<Item = Self>) -> Option<Blocked> {
         let blocked = refused.filter_map(|error| if let Self::Blocked(blocked) = error { Some(blocked) } else { None });
         blocked.reduce(|a, b| if b.lacks() < a.lacks() { b } else { a })
@@ -247,7 +242,6 @@ impl<'a> Program<'a> {
     }
 
     /// The wish as a stroke on the object, its direction turned towards the nearest face.
-    #[must_use]
     pub fn stroke(&self, wish: &Wish, object: &Standing) -> Stroke {
         let [x, y, z] = self.size;
         let from_face = wish.heading - object.yaw;
@@ -271,7 +265,6 @@ impl<'a> Program<'a> {
     }
 
     /// Where the object comes to rest, about: pushed until the tool slows down, then sliding freely.
-    #[must_use]
     pub fn rest(&self, stroke: &Stroke) -> [f64; 2] {
         let pushed = 0.25 * stroke.speed * stroke.rise + stroke.clearance + stroke.follow_through;
         Self::after(stroke, pushed.max(self.slide(stroke)))

@@ -34,7 +34,6 @@ pub struct Watch {
 /// What was seen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Quality {
-    /// States received.
     pub states: u64,
     /// States missing in the robot's own counter.
     pub lost_packets: u64,
@@ -47,7 +46,6 @@ pub struct Quality {
 /// Whether a clip is worth keeping.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
-    /// It is.
     Keep,
     /// It is not, and why.
     Repeat(String),
@@ -73,7 +71,6 @@ impl Watch {
     }
 
     /// What was seen so far.
-    #[must_use]
     pub fn quality(&self) -> Quality {
         self.quality
     }
@@ -81,7 +78,6 @@ impl Watch {
 
 impl Quality {
     /// The verdict, given the peak speed that was planned [rad/s].
-    #[must_use]
     pub fn verdict(&self, planned_speed: f64) -> Verdict {
         let expected = self.states + self.lost_packets;
         let lost = self.lost_packets as f64 / expected.max(1) as f64;

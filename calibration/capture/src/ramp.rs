@@ -45,7 +45,6 @@ struct Piece {
 impl Ramp {
     /// Triangles at the speeds from the lower to the higher of `speeds` [rad/s] in about `duration` [s], each as wide as its
     /// speed reaches and no wider than `amplitude` [rad] to either side; `seed` draws each joint's direction.
-    #[must_use]
     pub fn draw(speeds: [f64; 2], amplitude: f64, duration: f64, dof: usize, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let directions = (0..dof).map(|_| if rng.random_bool(0.5) { 1.0 } else { -1.0 }).collect();
@@ -63,13 +62,11 @@ impl Ramp {
     }
 
     /// Length [s].
-    #[must_use]
     pub fn duration(&self) -> f64 {
         self.duration
     }
 
     /// Excursion of `joint` at `t` [s] and its derivatives [rad].
-    #[must_use]
     pub fn at(&self, joint: usize, t: f64) -> Jet {
         let piece = self.pieces[self.pieces.partition_point(|piece| piece.begin <= t).saturating_sub(1)];
         piece.at(t).map(|x| self.directions[joint] * x)

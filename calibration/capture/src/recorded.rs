@@ -32,7 +32,6 @@ pub enum RepeatError {
     /// There is no such clip.
     #[error("{} has no clip {number} to repeat; it has {known}", folder.display())]
     Unknown {
-        /// The session.
         folder: PathBuf,
         /// The number asked for.
         number: usize,
@@ -42,7 +41,6 @@ pub enum RepeatError {
     /// The session knows no such object.
     #[error("{}: {what}", folder.display())]
     Object {
-        /// The session.
         folder: PathBuf,
         /// What stands in the way.
         what: String,
@@ -50,7 +48,6 @@ pub enum RepeatError {
     /// It is of the other kind.
     #[error("clip {number} {was}; repeat it with `{command}`")]
     Other {
-        /// Its number.
         number: usize,
         /// What was done in it.
         was: &'static str,
@@ -59,12 +56,7 @@ pub enum RepeatError {
     },
     /// Its desired positions are no motion that can be played.
     #[error("{} cannot be repeated: {why}; repeat another clip", file.display())]
-    Unfit {
-        /// The clip.
-        file: PathBuf,
-        /// Why not.
-        why: &'static str,
-    },
+    Unfit { file: PathBuf, why: &'static str },
 }
 
 /// A motion as it was commanded.

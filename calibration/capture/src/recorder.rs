@@ -19,10 +19,7 @@ pub enum RecordError {
     Process(#[from] ProcessError),
     /// The recorder runs but writes nothing.
     #[error("the recorder did not open {} within {} s; check that the disk has room", file.display(), START.as_secs())]
-    NoFile {
-        /// The clip.
-        file: PathBuf,
-    },
+    NoFile { file: PathBuf },
     /// Its answer is not what was agreed.
     #[error(
         "`rt_bridge record` answered {answer:?}, which holds no file, messages and bytes; build all programs from the same version"

@@ -41,7 +41,6 @@ pub struct Recovery {
 
 impl Recovery {
     /// Recovers by itself at most so often: an arm that stops itself more often is in trouble that a person has to look at.
-    #[must_use]
     pub fn new(most: u32) -> Self {
         Self { most, pending: None, done: 0 }
     }
@@ -59,7 +58,6 @@ impl Recovery {
     }
 
     /// Why the robot stopped itself, until that is settled.
-    #[must_use]
     pub fn reason(&self) -> Option<String> {
         self.pending.clone()
     }

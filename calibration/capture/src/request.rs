@@ -19,15 +19,11 @@ pub enum Kind {
         speeds: [f64; 2],
     },
     /// Rests in several poses.
-    Hold {
-        /// How many.
-        poses: usize,
-    },
+    Hold { poses: usize },
 }
 
 impl Kind {
     /// Length [s] and amplitude [rad] where nothing else is asked for.
-    #[must_use]
     pub fn usual(self) -> (f64, f64) {
         match self {
             Self::Multisine => (8.0, 0.25),

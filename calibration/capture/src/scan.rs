@@ -46,7 +46,6 @@ pub struct Options {
     pub distance: f64,
     /// What is further from there is no part of it [m].
     pub radius: f64,
-    /// Views.
     pub views: usize,
     /// The scan's folder; new.
     pub out: PathBuf,

@@ -19,7 +19,6 @@ pub struct Session {
 /// A session folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// Not usable.
     #[error("cannot use {}: {source}; choose another folder with --out or free space there", path.display())]
     Write {
         /// The file or folder.
@@ -39,7 +38,6 @@ pub enum SessionError {
     /// It was recorded in another cell.
     #[error("{} belongs to another cell: [{block}] differs from --cell; choose a new folder with --out", folder.display())]
     OtherCell {
-        /// The folder.
         folder: PathBuf,
         /// Block of cell.toml that differs.
         block: &'static str,
@@ -66,14 +64,11 @@ impl Session {
         Ok(session)
     }
 
-    /// The folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// The session's own cell.toml.
-    #[must_use]
     pub fn cell_file(&self) -> PathBuf {
         self.folder.join("cell.toml")
     }

@@ -23,13 +23,11 @@ const LOOK: Duration = Duration::from_millis(2);
 /// No picture could be had.
 #[derive(Debug, thiserror::Error)]
 pub enum ShotError {
-    /// The bridge.
     #[error(transparent)]
     Link(#[from] LinkError),
     /// Shared memory failed.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// Nobody films.
     #[error(
         "no pictures arrive on /camera/color; start the bridge with its camera (`rt_bridge run --camera realsense`), then start again"
     )]
@@ -56,7 +54,6 @@ pub struct Pixels {
 pub struct Shot {
     /// The arm then.
     pub state: ArmState,
-    /// Colour.
     pub colour: Pixels,
     /// Depth of the same moment.
     pub depth: Option<Pixels>,

@@ -29,7 +29,6 @@ pub struct Staged {
     pub standing: Standing,
     /// What it is.
     pub stroke: Stroke,
-    /// Its motion.
     pub plan: StrokePlan,
     /// What it is for, in words.
     pub words: String,
@@ -56,7 +55,6 @@ pub fn again(program: &Program<'_>, clip: &Repeated) -> anyhow::Result<Staged> {
 
 /// Straight strokes in `count` headings, evenly all round, through `place`; the object is turned so that a face meets each.
 /// Headings that cannot be done are left out: in words which, and why.
-#[must_use]
 pub fn headings(
     program: &Program<'_>,
     count: usize,

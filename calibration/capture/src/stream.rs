@@ -55,7 +55,6 @@ pub enum StreamError {
         /// What the bridge said.
         reason: String,
     },
-    /// Nothing happened.
     #[error(
         "the bridge did not take up the motion within 2 s; another motion may be in its way: wait for its end or restart the bridge"
     )]
@@ -98,13 +97,11 @@ pub struct Feeder<'a> {
 
 impl<'a> Feeder<'a> {
     /// A motion that the bridge will know as `motion_id`.
-    #[must_use]
     pub fn new(motion: Motion<'a>, motion_id: u64) -> Self {
         Self { motion, motion_id, sent: 0 }
     }
 
     /// What the arm's newest state asks for.
-    #[must_use]
     pub fn next(&self, state: &ArmState) -> Step {
         let ours = state.motion_id == self.motion_id;
         match state.motion {
@@ -135,7 +132,6 @@ impl<'a> Feeder<'a> {
     }
 
     /// The order to brake.
-    #[must_use]
     pub fn stop(&self, now_ns: u64) -> MotionChunk {
         self.empty(MotionKind::Stop, now_ns)
     }

@@ -10,7 +10,6 @@ const MOVED: f64 = 5e-3;
 /// Share of lost poses from which a stroke is better repeated.
 const POSES_LOST: f64 = 0.1;
 
-/// One clip.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ClipSummary {
     /// File, relative to the session.
@@ -19,7 +18,6 @@ pub struct ClipSummary {
     pub motion: String,
     /// `true`: entered into cell.toml. A clip that is not stays on disk.
     pub kept: bool,
-    /// Why not.
     pub why: Option<String>,
     /// `true`: the user paused it, so another takes its place.
     pub paused: bool,
@@ -58,7 +56,6 @@ pub(super) fn unfit(seen: &PoseQuality, pushed: &[(String, f64, f64)]) -> Option
 
 impl ClipSummary {
     /// The clip's quality in a line.
-    #[must_use]
     pub fn line(&self) -> String {
         let verdict = match &self.why {
             None => "keep".to_owned(),

@@ -19,7 +19,6 @@ pub struct Task {
     pub repeat: Vec<usize>,
     /// How many times as fast as it would be every motion that is recorded is played.
     pub speed: f64,
-    /// Session folder.
     pub out: PathBuf,
     /// Whether clips may go beside those of another source.
     pub mix: bool,
@@ -36,7 +35,6 @@ pub struct Task {
 /// What was done.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary<Clip> {
-    /// Session folder.
     pub session: PathBuf,
     /// Clips of this run, in order.
     pub clips: Vec<Clip>,
@@ -60,13 +58,11 @@ pub fn cause(error: anyhow::Error, bridge: &mut Bridge) -> anyhow::Error {
 
 impl Task {
     /// Number of the clip that is played again as this run's clip `count` (from 0); `None`: a new one.
-    #[must_use]
     pub fn repeated(&self, count: usize) -> Option<usize> {
         (!self.repeat.is_empty()).then(|| self.repeat[count % self.repeat.len()])
     }
 
     /// ` at 0.5 times the speed`, where it is another than usual.
-    #[must_use]
     pub fn pace(&self) -> String {
         if self.speed == 1.0 { String::new() } else { format!(" at {} times the speed", self.speed) }
     }

@@ -18,7 +18,6 @@ const IDLE: f64 = 1.0;
 
 /// Set points of the way, the first in `from` and the last in `to`, one a control cycle, at a share `pace` of the usual
 /// speed; `None` where no way is found.
-#[must_use]
 pub fn plan(from: &Joints, to: &Joints, limits: &[JointLimits], pace: f64) -> Option<Vec<SetPoint>> {
     let mut input = InputParameter::<MAX_JOINTS>::new(None);
     input.synchronization = Synchronization::Time;

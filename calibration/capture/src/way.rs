@@ -48,9 +48,7 @@ pub enum WayError {
 /// How ways are judged.
 #[derive(Debug, Clone, Copy)]
 pub struct Ways<'a> {
-    /// The arm.
     pub body: &'a Body,
-    /// Its limits.
     pub limits: &'a [JointLimits],
     /// Height of the tool's end while it travels [m].
     pub height: f64,
@@ -157,7 +155,6 @@ impl Ways<'_> {
 }
 
 /// The tool's end pointing straight down at a place, turned about its own axis by `turn` [rad].
-#[must_use]
 pub fn upright(place: Vector3<f64>, turn: f64) -> Isometry3<f64> {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
     Isometry3::from_parts(Translation3::from(place), down * about_itself(turn))

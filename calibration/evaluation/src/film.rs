@@ -9,7 +9,6 @@ use twin::task::{Task, TaskCamera};
 const WIDE: u32 = 150;
 
 /// A PNG file of the moments through the task's first camera; `None` for a task without one, or without moments.
-#[must_use]
 pub fn strip(task: &Task, stills: &[Still]) -> Option<Vec<u8>> {
     let camera = smaller(task.cameras().first()?);
     let [width, height] = camera.size.map(|pixels| pixels as usize);

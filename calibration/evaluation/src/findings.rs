@@ -107,7 +107,6 @@ fn trials_of<'c>(cells: &'c Cells<'c>, key: [&'c str; 3]) -> &'c [&'c Trial] {
 }
 
 /// What the trials say. Worlds in `real` are predicted by all others; `seed` draws the bootstrap.
-#[must_use]
 pub fn findings(trials: &[Trial], real: &[String], seed: u64) -> Findings {
     let mut cells: Cells<'_> = BTreeMap::new();
     for trial in trials {

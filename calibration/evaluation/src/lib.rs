@@ -10,6 +10,7 @@
 //! | [`statistics`] | intervals, tests and ranks of trials that succeed or fail |
 //! | [`findings`] | what trials say: policies against each other, worlds against each other |
 //! | [`film`] | moments of an episode as a picture |
+#![warn(missing_docs)]
 
 pub mod film;
 pub mod findings;

@@ -107,7 +107,6 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Trial>, TrialsError> {
 }
 
 /// Trials as a table that [`read`] takes.
-#[must_use]
 pub fn table<'a>(trials: impl IntoIterator<Item = &'a Trial>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     // A vector takes whatever is written.

@@ -151,26 +151,22 @@ impl Interrupt {
     }
 
     /// The same, for work that shall end once so much time is over, too.
-    #[must_use]
     pub fn within(&self, budget: Option<Duration>) -> Self {
         let deadline = budget.and_then(|budget| Instant::now().checked_add(budget));
         Self { deadline, ..self.clone() }
     }
 
     /// Whether the end was asked for, or the time is spent.
-    #[must_use]
     pub fn asked(&self) -> bool {
         self.cancelled() || self.spent()
     }
 
     /// Whether the end was asked for: nobody waits for an answer any more.
-    #[must_use]
     pub fn cancelled(&self) -> bool {
         self.end.load(Ordering::SeqCst)
     }
 
     /// Whether the time is spent: the best answer so far is waited for.
-    #[must_use]
     pub fn spent(&self) -> bool {
         self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
@@ -181,13 +177,11 @@ impl Interrupt {
     }
 
     /// Whether a pause was asked for.
-    #[must_use]
     pub fn paused(&self) -> bool {
         self.pause.load(Ordering::Relaxed) != 0
     }
 
     /// Whether the work has to stop, for good or for now.
-    #[must_use]
     pub fn halted(&self) -> bool {
         self.asked() || self.paused()
     }

@@ -87,7 +87,6 @@ impl Stored {
 
 impl Kept {
     /// Nothing is kept.
-    #[must_use]
     pub fn nothing() -> &'static Self {
         static NOTHING: LazyLock<Kept> = LazyLock::new(Kept::default);
         &NOTHING
@@ -95,7 +94,6 @@ impl Kept {
 
     /// What was kept in `file` of the same question, and will be. Results that come after `interrupt` asked for the end are
     /// those of work that was cut short, and not kept.
-    #[must_use]
     pub fn in_file(file: Option<PathBuf>, question: &Fingerprint, interrupt: &Interrupt) -> Self {
         let question = question.number();
         let stored = file.as_deref().and_then(|file| Stored::of(question, file));
@@ -109,7 +107,6 @@ impl Kept {
     }
 
     /// Whether something was found in the file, or will be found there.
-    #[must_use]
     pub fn holds_something(&self) -> bool {
         !self.results().by_step.is_empty()
     }
@@ -144,7 +141,6 @@ impl Kept {
     }
 
     /// What was kept of a step.
-    #[must_use]
     pub fn known<T: DeserializeOwned>(&self, step: &Fingerprint) -> Option<T> {
         self.results().by_step.get(&step.number()).and_then(|bytes| postcard::from_bytes(bytes).ok())
     }
@@ -188,7 +184,6 @@ impl Kept {
     }
 
     /// What an interrupted program says of it, once it is in the file. `command`: what the person typed.
-    #[must_use]
     pub fn farewell(&self, command: &str) -> String {
         match self.save() {
             Ok(Some(file)) => {
@@ -210,7 +205,6 @@ impl Kept {
 
 /// The results of a command's work: beside its answer `out`, else in the folder of the session. What is found is taken there
 /// when the process has to end before the work does, too.
-#[must_use]
 pub fn for_work(
     (out, session, verb): (Option<&Path>, &Path, &str),
     question: &Fingerprint,

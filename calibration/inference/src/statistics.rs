@@ -3,39 +3,34 @@
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, Normal, StudentsT};
 
 /// Half the interval that holds `level` of a normal distribution [sigmas].
-#[must_use]
 pub fn normal(level: f64) -> f64 {
     Normal::standard().inverse_cdf(0.5 + 0.5 * level)
 }
 
 /// Half the interval that holds `level` of Student's distribution with `free` degrees of freedom; infinite for none.
-#[must_use]
 pub fn student(level: f64, free: usize) -> f64 {
     StudentsT::new(0.0, 1.0, free as f64).map_or(f64::INFINITY, |t| t.inverse_cdf(0.5 + 0.5 * level))
 }
 
 /// How many standard errors of an estimate with `free` degrees of freedom, at least 1, are as rare as `sigmas` of a normal one.
-#[must_use]
 pub fn student_sigmas(sigmas: f64, free: usize) -> f64 {
     let chance = Normal::standard().cdf(sigmas);
     StudentsT::new(0.0, 1.0, free.max(1) as f64).map_or(f64::INFINITY, |t| t.inverse_cdf(chance))
 }
 
 /// The chance of more than `value` in Fisher's distribution; 1 where there are no degrees of freedom.
-#[must_use]
 pub fn beyond_f(value: f64, above: usize, below: usize) -> f64 {
     FisherSnedecor::new(above as f64, below as f64).map_or(1.0, |f| f.sf(value))
 }
 
 /// The middle value, of two the mean; `None` of none. Values that are no numbers count as the largest.
-#[must_use]
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     let middle = values.len() / 2;
     if values.is_empty() {
         return None;
     }
-    let even = values.len() % 2 == 0;
+    let even = values.len().is_multiple_of(2);
     let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
     let lower = below.iter().copied().max_by(f64::total_cmp).filter(|_| even);
     Some(lower.map_or(*upper, |lower| 0.5 * (lower + *upper)))

@@ -29,16 +29,12 @@ const INTERRUPTED: &str = "interrupted";
 /// A policy cannot act on the robot.
 #[derive(Debug, thiserror::Error)]
 pub enum ActedError {
-    /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// The policy.
     #[error(transparent)]
     Policy(#[from] PolicyError),
-    /// No thread.
     #[error("the stream of targets does not start: {0}; end other programs")]
     Thread(#[from] std::io::Error),
-    /// No bridge.
     #[error("no bridge showed an arm within {} s; start one with `rt_bridge run --cell cell.toml --arm sim`", PATIENCE.as_secs())]
     NoBridge,
     /// The bridge, or the task, is of no use.

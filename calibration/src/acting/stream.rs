@@ -41,7 +41,6 @@ impl Stream {
         self.legs.as_ref().is_some_and(|legs| legs.send(leg).is_ok())
     }
 
-    /// Ends it.
     pub(super) fn end(mut self) -> Result<(), TransportError> {
         self.stop()
     }

@@ -45,9 +45,7 @@ pub struct Labelled {
 /// A criterion with what labelled sessions make of it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Regenerated {
-    /// Its name.
     pub name: &'static str,
-    /// Its unit.
     pub unit: &'static str,
     /// What it says.
     pub meaning: &'static str,
@@ -95,7 +93,6 @@ fn one(place: &Path) -> anyhow::Result<Labelled> {
 }
 
 /// What sessions make of every criterion.
-#[must_use]
 pub fn regenerate(sessions: &[Labelled]) -> Vec<Regenerated> {
     let all = || sessions.iter();
     let nothing = |sensors| {

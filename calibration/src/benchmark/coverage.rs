@@ -53,7 +53,6 @@ pub struct Session {
 
 impl Subject {
     /// How often its intervals say that they hold the truth.
-    #[must_use]
     pub const fn level(&self) -> f64 {
         match self {
             Self::Arm(_) | Self::Object => 0.95,
@@ -190,7 +189,6 @@ pub struct Covered {
 }
 
 /// Every number that sessions printed, by name.
-#[must_use]
 pub fn covered(sessions: &[Session], level: f64) -> BTreeMap<String, Covered> {
     let mut by_name: BTreeMap<String, Vec<&Printed>> = BTreeMap::new();
     for printed in sessions.iter().flat_map(|session| &session.printed) {
@@ -224,14 +222,12 @@ impl Covered {
 
 impl Printed {
     /// Whether the interval holds the truth.
-    #[must_use]
     pub fn holds(&self) -> bool {
         (self.interval[0]..=self.interval[1]).contains(&self.truth)
     }
 }
 
 /// A line for each number, and one for all together.
-#[must_use]
 pub fn table(sessions: &[Session], level: f64) -> String {
     let printed: Vec<&Printed> = sessions.iter().flat_map(|session| &session.printed).collect();
     let mut all: Vec<(String, Covered)> = covered(sessions, level).into_iter().collect();

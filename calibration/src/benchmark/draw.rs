@@ -15,14 +15,12 @@ use twin::effects::{EffectInfo, Parameter, Role, Shape, Stage, registry};
 const SMALLEST: f64 = 0.33;
 
 /// Causes that can show in clips of the arm alone, or in strokes.
-#[must_use]
 pub fn candidates(with_object: bool) -> Vec<&'static EffectInfo> {
     let shows = |effect: &&EffectInfo| with_object || effect.stage == Stage::Control;
     registry().iter().filter(shows).filter(|effect| effect.is_cause()).collect()
 }
 
 /// An effect with sizes and forms drawn from its plausible ranges.
-#[must_use]
 pub fn effect(info: &EffectInfo, cell: &Cell, rng: &mut Pcg64) -> EffectTheta {
     let strength = SMALLEST.powf(rng.random_range(0.0..1.0));
     let parameters: BTreeMap<String, toml::Value> = info
@@ -35,7 +33,6 @@ pub fn effect(info: &EffectInfo, cell: &Cell, rng: &mut Pcg64) -> EffectTheta {
 }
 
 /// Two different effects that do not act on the same number.
-#[must_use]
 pub fn two_effects(with_object: bool, cell: &Cell, rng: &mut Pcg64) -> Vec<EffectTheta> {
     let all = candidates(with_object);
     let pick = |rng: &mut Pcg64| *all.choose(rng).expect("the registry is not empty");

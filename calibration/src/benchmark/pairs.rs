@@ -45,7 +45,6 @@ pub struct Outcome {
     pub truth: String,
     /// True change of its first number.
     pub size: f64,
-    /// The verdict.
     pub verdict: String,
     /// What it names.
     pub changes: Vec<String>,
@@ -59,7 +58,6 @@ pub struct Outcome {
 
 impl Changed {
     /// The name under which a comparison tells it; empty for nothing.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Nothing(_) => "",
@@ -80,7 +78,6 @@ impl Changed {
     }
 
     /// The worlds of both sessions, and the true change of the first number.
-    #[must_use]
     pub fn worlds(self, number: u64, cell: &Cell) -> ([World; 2], f64) {
         let mut rng = Pcg64::seed_from_u64(number ^ 0x00C0_FFEE);
         let mut a = World::draw(number, self.kind(), Fault::Nothing, cell);
@@ -194,7 +191,6 @@ fn first_of(effect: &EffectTheta) -> f64 {
 
 impl Outcome {
     /// Whether what it says is right: the change named, alone or in a class; nothing where nothing changed.
-    #[must_use]
     pub fn is_right(&self) -> bool {
         if self.truth.is_empty() {
             return !matches!(self.verdict.as_str(), "named" | "class");
@@ -207,7 +203,6 @@ impl Outcome {
     }
 
     /// Whether the interval holds the true change; none where it was not found.
-    #[must_use]
     pub fn holds(&self) -> Option<bool> {
         self.found.map(|(_, [low, high])| (low..=high).contains(&self.size))
     }

@@ -9,7 +9,6 @@ use shared_mem::cell::Cell;
 use shared_mem::console;
 use shared_mem::progress::Progress;
 
-/// Which worlds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
     /// A dozen of all sorts.
@@ -23,7 +22,6 @@ pub enum Extent {
 /// What is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
-    /// Which worlds.
     pub extent: Extent,
     /// Clips in each session.
     pub clips: usize,
@@ -44,7 +42,6 @@ pub struct Outcome {
 }
 
 /// Runs the benchmark. Ctrl-C ends it, without the world in hand.
-#[must_use]
 pub fn run(plan: &Plan, cell: &Cell, interrupt: &Interrupt) -> Outcome {
     let worlds = plan.worlds();
     let bar = Progress::new("benchmark", worlds.len() as u64);

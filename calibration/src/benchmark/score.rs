@@ -52,22 +52,18 @@ pub struct Case {
 pub struct Rate {
     /// Cases that count for it.
     pub hits: usize,
-    /// All cases.
     pub of: usize,
     /// 95 % interval of Clopper and Pearson (1934).
     pub ci95: [f64; 2],
 }
 
 impl Rate {
-    /// Counts cases.
-    #[must_use]
     pub fn count(cases: impl Iterator<Item = bool>) -> Self {
         let (hits, of) = cases.fold((0, 0), |(hits, of), hit| (hits + usize::from(hit), of + 1));
         Self { hits, of, ci95: [clopper_pearson(hits, of, 0.025), 1.0 - clopper_pearson(of - hits, of, 0.025)] }
     }
 
     /// The share; 0 without cases.
-    #[must_use]
     pub fn value(&self) -> f64 {
         self.hits as f64 / self.of.max(1) as f64
     }
@@ -103,7 +99,6 @@ pub const TESTABLE: f64 = 6.0;
 
 impl Scores {
     /// Scores the cases.
-    #[must_use]
     pub fn of(cases: &[Case]) -> Self {
         let testable = |n: usize| {
             cases
@@ -145,7 +140,6 @@ impl Said {
 
 impl Case {
     /// What is true and what was said, for a log.
-    #[must_use]
     pub fn line(&self) -> String {
         let (truth, said) = (self.truth_label(), self.said.label());
         format!("world {}: {truth} -> {said}, {:.0} % sure", self.world, 100.0 * self.said.confidence)
@@ -198,7 +192,6 @@ fn sorted(names: &[String]) -> Vec<String> {
 }
 
 /// Mean confidence and share of true verdicts in each of ten bins of confidence that holds any, lowest first.
-#[must_use]
 pub fn reliability(cases: &[Case]) -> Vec<(f64, Rate)> {
     let mut bins: [Vec<&Case>; 10] = Default::default();
     for case in cases {

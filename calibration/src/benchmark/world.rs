@@ -22,11 +22,9 @@ pub enum Kind {
 /// How many effects act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
-    /// None.
     Nothing,
     /// The effect with this place among the candidates, counted round.
     Single(usize),
-    /// Two.
     Pair,
     /// Something outside the registry.
     Outside(Outside),
@@ -51,7 +49,6 @@ pub enum Outside {
 
 impl Outside {
     /// Those that show in clips of a kind.
-    #[must_use]
     pub fn of(kind: Kind) -> &'static [Self] {
         match kind {
             Kind::Excitation => &[Self::Cooling, Self::HeldCommands, Self::Hose],
@@ -60,7 +57,6 @@ impl Outside {
     }
 
     /// Name in tables.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Cooling => "cooling gears",
@@ -73,10 +69,8 @@ impl Outside {
     }
 }
 
-/// A world.
 #[derive(Debug, Clone)]
 pub struct World {
-    /// Its number.
     pub number: u64,
     /// What kind of session it gives.
     pub kind: Kind,
@@ -96,7 +90,6 @@ pub struct World {
 
 impl World {
     /// Draws world `number`.
-    #[must_use]
     pub fn draw(number: u64, kind: Kind, fault: Fault, cell: &Cell) -> Self {
         let mut rng = Pcg64::seed_from_u64(number);
         let with_object = kind == Kind::Strokes;

@@ -26,7 +26,6 @@ const PUSHED: f64 = 5e-3;
 /// It is touched so much earlier, at the speeds of strokes [s].
 const EARLIER: f64 = 0.05;
 
-/// A clip.
 #[derive(Debug, Clone)]
 pub(super) struct Columns {
     /// Its file, as cell.toml lists it.

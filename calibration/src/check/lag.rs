@@ -28,7 +28,6 @@ pub struct Lag {
 
 impl Lag {
     /// Whether the interval holds leads and lags that would both matter.
-    #[must_use]
     pub fn tells_neither(&self) -> bool {
         self.interval[0] < -LEAD && self.interval[1] > LEAD
     }

@@ -6,7 +6,6 @@ use super::remark::{Fault, Remark};
 use super::statistics::{deviation, root_mean_square};
 use super::{fall, torque};
 
-/// A picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// What is shown.

@@ -33,7 +33,6 @@ pub enum Fault {
     CommandUnit,
     /// Positions in degrees.
     Degrees,
-    /// Joints exchanged.
     JointOrder,
     /// A joint counted the other way round.
     JointSign,
@@ -120,7 +119,6 @@ impl Fault {
     ];
 
     /// Its name in JSON and in docs/check.md.
-    #[must_use]
     pub fn key(self) -> &'static str {
         match self {
             Self::MixedOrigins => "mixed_origins",
@@ -158,7 +156,6 @@ impl Fault {
     }
 
     /// How much it matters where nothing mends it.
-    #[must_use]
     pub fn severity(self) -> Severity {
         match self {
             Self::MixedOrigins
@@ -197,17 +194,14 @@ impl Fault {
 /// How large a fault is, in SI units unless the unit says otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Size {
-    /// The estimate.
     pub value: f64,
     /// Its 95 % interval, or the range over joints or clips where that is wider; equal to the value for a count.
     pub interval: [f64; 2],
-    /// Unit.
     pub unit: &'static str,
 }
 
 impl Size {
     /// A number that is counted, not estimated.
-    #[must_use]
     pub fn count(value: f64, unit: &'static str) -> Self {
         Self { value, interval: [value; 2], unit }
     }
@@ -216,7 +210,6 @@ impl Size {
 /// What is remarked about a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Remark {
-    /// The family.
     pub fault: Fault,
     /// How much it matters.
     pub severity: Severity,
@@ -226,9 +219,7 @@ pub struct Remark {
     pub channel: String,
     /// When in the first of the clips, from its first row [s]; none where it holds throughout.
     pub at_s: Option<f64>,
-    /// One sentence.
     pub what: String,
-    /// How large.
     pub size: Option<Size>,
     /// What to do: a command, or the line to change.
     pub remedy: String,
@@ -236,7 +227,6 @@ pub struct Remark {
 
 impl Remark {
     /// A remark on one clip with the severity of its family.
-    #[must_use]
     pub fn new(fault: Fault, clip: &str, channel: impl Into<String>, what: impl Into<String>) -> Self {
         Self {
             fault,
@@ -251,31 +241,26 @@ impl Remark {
     }
 
     /// With its size.
-    #[must_use]
     pub fn sized(self, size: Size) -> Self {
         Self { size: Some(size), ..self }
     }
 
     /// With what to do.
-    #[must_use]
     pub fn mended_by(self, remedy: impl Into<String>) -> Self {
         Self { remedy: remedy.into(), ..self }
     }
 
     /// With when it shows [s].
-    #[must_use]
     pub fn at(self, seconds: f64) -> Self {
         Self { at_s: Some(seconds), ..self }
     }
 
     /// With another severity than its family's.
-    #[must_use]
     pub fn weighed(self, severity: Severity) -> Self {
         Self { severity, ..self }
     }
 
     /// The clips in words: `clip_00.mcap and 6 more`.
-    #[must_use]
     pub fn clips_in_words(&self) -> String {
         match &self.clips[..] {
             [] => String::new(),
@@ -294,7 +279,6 @@ impl fmt::Display for Remark {
 
 /// One remark for each fault of a channel, with all the clips that show it; those that matter most first, and of these in the
 /// order of [`Fault::ALL`].
-#[must_use]
 pub fn merged(remarks: Vec<Remark>) -> Vec<Remark> {
     let mut all: Vec<Remark> = Vec::new();
     for remark in remarks {

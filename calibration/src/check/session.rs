@@ -30,7 +30,6 @@ pub struct Checked {
     pub origin: String,
     /// What is odd about it, worst first.
     pub remarks: Vec<Remark>,
-    /// Its clips.
     pub clips: Vec<ClipFacts>,
     /// What is missing for verbs that no clip is good for, or that need more than the clips are.
     pub missing: Vec<good_for::Missing>,
@@ -68,7 +67,6 @@ pub struct Found {
 }
 
 /// Looks at clips of a cell, each with its file as cell.toml lists it.
-#[must_use]
 pub fn check_clips(cell: &Cell, clips: &[(String, Clip)]) -> Found {
     let known = Known::of(cell);
     let looked: Vec<Looked> = clips.par_iter().map(|(file, clip)| look(file, clip, &known)).collect();
@@ -83,7 +81,6 @@ pub fn check_clips(cell: &Cell, clips: &[(String, Clip)]) -> Found {
 }
 
 /// Looks at a session: everything of it, for the verb.
-#[must_use]
 pub fn check(session: &Session) -> Checked {
     let Read { clips, unread } = Read::of(session);
     let origin = origins::provenance(&clips).to_string();

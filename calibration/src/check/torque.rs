@@ -177,7 +177,6 @@ fn model(arm: &ArmModel, moment: &Moment) -> Model {
 }
 
 /// Torques of the model's motion behind the gears, gravity apart [N m].
-#[must_use]
 pub fn motion(arm: &ArmModel, state: &JointState, ddq: &Joints) -> Joints {
     let (mass, bias, rotor) = (arm.mass_matrix(&state.q), arm.bias(state), arm.rotor_inertia());
     let gravity = arm.gravity(&state.q);

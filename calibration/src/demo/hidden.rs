@@ -10,7 +10,6 @@ use shared_mem::theta::{ArmTheta, EffectTheta, Theta};
 const WITHIN: f64 = 0.2;
 
 /// Draws every stiffness and damping of the robot by `seed`.
-#[must_use]
 pub(super) fn gains(nominal: &Controller, seed: u64) -> Theta {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut draw = |values: &[f64]| values.iter().map(|v| v * rng.random_range(1.0 - WITHIN..1.0 + WITHIN)).collect();
@@ -27,7 +26,6 @@ const EFFECTS: [(&str, &str, [f64; 2]); 4] = [
 ];
 
 /// Draws an effect by `seed`.
-#[must_use]
 pub(super) fn effect(seed: u64) -> EffectTheta {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let (name, parameter, [lo, hi]) = EFFECTS[rng.random_range(0..EFFECTS.len())];

@@ -52,7 +52,6 @@ pub struct Options {
 pub struct Finding {
     /// The finding in one sentence.
     pub text: String,
-    /// The page.
     pub report: PathBuf,
     /// The recorded session.
     pub session: PathBuf,
@@ -62,13 +61,11 @@ pub struct Finding {
     pub hidden_effect: PathBuf,
     /// What the diagnosis says.
     pub verdict: Verdict,
-    /// Its page.
     pub diagnosis: PathBuf,
     /// The parameters and effects found.
     pub theta: PathBuf,
     /// What drew them.
     pub seed: u64,
-    /// Clips recorded.
     pub clips: usize,
     /// RMS of twin minus robot.
     pub gap: Gap,
@@ -323,7 +320,6 @@ fn compare(
 
 impl Finding {
     /// The finding as a table for people.
-    #[must_use]
     pub fn table(&self) -> String {
         let mut lines = vec!["joint   cell.toml   as found     [mrad RMS]".to_owned()];
         for (joint, (before, after)) in self.gap.before.iter().zip(&self.gap.after).enumerate() {

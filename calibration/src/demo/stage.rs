@@ -136,14 +136,12 @@ impl LiveGap {
     }
 
     /// Largest RMS over a second of each joint, of everything taken in [rad].
-    #[must_use]
     pub(super) fn largest(&self) -> &[f64] {
         &self.largest
     }
 }
 
 /// The joint with the largest value, from 0, and that value.
-#[must_use]
 pub(super) fn worst(values: &[f64]) -> (usize, f64) {
     let largest = values.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
     largest.unwrap_or((0, 0.0))

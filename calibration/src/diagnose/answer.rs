@@ -12,7 +12,6 @@ use std::path::PathBuf;
 /// What was found about a session.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Diagnosis {
-    /// The finding.
     pub verdict: Verdict,
     /// How large the gap is.
     pub gap: Gap,
@@ -70,7 +69,6 @@ pub struct Diagnosis {
 /// A motion to be played by whatever drives the arm.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct NextMotion {
-    /// In words.
     pub text: String,
     /// Where it was written: a CSV of a row a control cycle, time [s] and the position of each joint [rad].
     pub file: Option<PathBuf>,
@@ -87,7 +85,6 @@ pub struct NextMotion {
 
 impl NextMotion {
     /// A motion that nobody has planned yet.
-    #[must_use]
     pub fn new(motion: ArmMotion) -> Self {
         let (text, why) =
             (motion.in_words(), "with --report or --out it is written beside that file as CSV".to_owned());
@@ -95,7 +92,6 @@ impl NextMotion {
     }
 
     /// In a line, with where it is or why it is nowhere.
-    #[must_use]
     pub fn in_words(&self) -> String {
         let Self { text, file, rate_hz, seconds, why, .. } = self;
         match (file, seconds, why) {
@@ -110,13 +106,11 @@ impl NextMotion {
 
 impl Diagnosis {
     /// Whether any parameter was identified: clips that say too little tell none.
-    #[must_use]
     pub fn identifies(&self) -> bool {
         !self.clips.train.is_empty()
     }
 }
 
-/// The finding.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Verdict {
     /// Which of the five it is.
@@ -213,7 +207,6 @@ pub struct Gap {
 /// all clips).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SensorGap {
-    /// Which.
     pub sensors: Sensors,
     /// With the paper's parameters identified.
     pub before: f64,
@@ -238,13 +231,11 @@ pub enum Sensors {
 pub struct TorqueRms {
     /// Without the effects.
     pub before: Vec<f64>,
-    /// With them.
     pub after: Vec<f64>,
 }
 
 impl TorqueRms {
     /// Over all joints, too.
-    #[must_use]
     pub fn over_joints(&self) -> Change {
         let all = |joints: &[f64]| {
             Some((joints.iter().map(|joint| joint * joint).sum::<f64>() / joints.len().max(1) as f64).sqrt())
@@ -265,7 +256,6 @@ pub struct Nearest {
 /// A share with its 90 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Share {
-    /// The share.
     pub value: f64,
     /// Its interval over clips.
     pub ci90: [f64; 2],
@@ -276,7 +266,6 @@ pub struct Share {
 pub struct Change {
     /// Without the effects.
     pub before: Option<f64>,
-    /// With them.
     pub after: Option<f64>,
 }
 
@@ -289,7 +278,6 @@ pub struct StageTest {
     pub recorded_arm_add_m: f64,
     /// Share of the first that is gone in the second.
     pub of_the_arm: f64,
-    /// Clips.
     pub clips: usize,
     /// In how many of them the recorded arm does not touch the object.
     pub untouched: usize,
@@ -333,7 +321,6 @@ pub struct Candidate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// It acts.
     Named,
     /// It may act.
     Possible,
@@ -346,7 +333,6 @@ pub enum Status {
 /// Files of the clips by use.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Clips {
-    /// Fitted.
     pub train: Vec<String>,
     /// Chose between effects.
     pub choose: Vec<String>,

@@ -13,11 +13,9 @@
 pub struct Criterion {
     /// Name, as `benchmark --calibrate` prints it.
     pub name: &'static str,
-    /// Unit.
     pub unit: &'static str,
     /// What it says.
     pub meaning: &'static str,
-    /// Its value.
     pub value: f64,
 }
 

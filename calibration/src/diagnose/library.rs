@@ -32,7 +32,6 @@ pub struct Library {
     reaches: Vec<ArmReach>,
     /// The baseline's numbers: gains, and the object's parameters.
     pub baseline: Range<usize>,
-    /// Effects.
     pub candidates: Vec<Candidate>,
     /// How strong they may be on this robot.
     robot: Robot,
@@ -41,9 +40,7 @@ pub struct Library {
 /// One effect as a hypothesis.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// The effect.
     pub effect: &'static EffectInfo,
-    /// Its numbers.
     pub numbers: Range<usize>,
     /// Those of them that are fitted.
     pub turned: Vec<usize>,
@@ -77,19 +74,16 @@ pub struct Probe {
 
 impl Candidate {
     /// Whether it acts on the arm itself; the others act on what the arm meets and on what the camera sees of it.
-    #[must_use]
     pub fn is_of_arm(&self) -> bool {
         self.effect.stage == Stage::Control
     }
 
     /// Whether one of its parameters is come by in this way.
-    #[must_use]
     pub fn is_searched(&self, search: Search) -> bool {
         self.effect.parameters.iter().any(|parameter| parameter.search == search)
     }
 
     /// One of the sizes at the strongest that is met in practice; `resting`: where it changes nothing.
-    #[must_use]
     pub fn strongest(&self, size: usize, resting: f64) -> Option<f64> {
         let mut probes = self.alternatives.iter().flat_map(|alternative| &alternative.probes);
         let probe = probes.find(|probe| probe.moves[0].0 == size)?;
@@ -101,7 +95,6 @@ impl Library {
     /// The library of a cell: with effects on the arm, and with those on hit, slide and camera where clips have an object,
     /// which crossed this `ground`. `base`: a complete theta whose effects act in the baseline already and are no candidates.
     /// `peaks`: the largest torque that each joint is asked for in the clips [N m].
-    #[must_use]
     pub fn new(cell: &Cell, base: &Theta, ground: Option<&Ground>, peaks: &Joints) -> Self {
         let with_object = ground.is_some();
         let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
@@ -183,13 +176,11 @@ impl Library {
     }
 
     /// Where every search begins: the baseline's values, all effects at rest.
-    #[must_use]
     pub fn start(&self) -> Vec<f64> {
         self.unknowns.iter().map(|unknown| unknown.start).collect()
     }
 
     /// The parameters that go with these numbers, without effects that change nothing.
-    #[must_use]
     pub fn theta(&self, numbers: &[f64]) -> Theta {
         let mut theta = self.settings.theta(numbers);
         let resting: Vec<&str> = (self.candidates.iter())
@@ -201,7 +192,6 @@ impl Library {
     }
 
     /// Numbers with the baseline's object as others have it.
-    #[must_use]
     pub fn with_object_of(&self, mut numbers: Vec<f64>, others: &[f64]) -> Vec<f64> {
         for k in self.baseline.clone().filter(|k| !self.arm_feels(*k, &numbers)).collect::<Vec<_>>() {
             numbers[k] = others[k];
@@ -210,7 +200,6 @@ impl Library {
     }
 
     /// Whether the arm feels a number where the numbers are these.
-    #[must_use]
     pub fn arm_feels(&self, number: usize, numbers: &[f64]) -> bool {
         match self.reaches[number] {
             ArmReach::Always => true,
@@ -220,20 +209,17 @@ impl Library {
     }
 
     /// Whether the arm feels a candidate in one of its forms.
-    #[must_use]
     pub fn arm_may_feel(&self, candidate: usize) -> bool {
         self.candidates[candidate].numbers.clone().any(|k| !matches!(self.reaches[k], ArmReach::Never))
     }
 
     /// Those of the numbers that the arm feels.
-    #[must_use]
     pub fn felt_by_arm(&self, numbers: &[f64]) -> Vec<f64> {
         (0..numbers.len()).filter(|k| self.arm_feels(*k, numbers)).map(|k| numbers[k]).collect()
     }
 
     /// Values of the parameter behind a number of an effect that are met in practice on this robot; `None` for numbers of the
     /// baseline.
-    #[must_use]
     pub fn met(&self, number: usize) -> Option<[f64; 2]> {
         met(&self.robot, &self.settings.settings()[number])
     }
@@ -245,14 +231,12 @@ impl Library {
     }
 
     /// Whether two candidates are known to look alike in some recordings.
-    #[must_use]
     pub fn look_alike(&self, a: usize, b: usize) -> bool {
         let [a, b] = [a, b].map(|candidate| self.candidates[candidate].effect);
         a.confusable_with.contains(&b.name) || b.confusable_with.contains(&a.name)
     }
 
     /// Index of the candidate with this name.
-    #[must_use]
     pub fn find(&self, name: &str) -> Option<usize> {
         self.candidates.iter().position(|candidate| candidate.effect.name == name)
     }

@@ -93,7 +93,6 @@ pub enum DiagnoseError {
     /// The cell's parameters.
     #[error(transparent)]
     Base(#[from] BaseError),
-    /// The cell.
     #[error(transparent)]
     Cell(#[from] SimError),
     /// A replay at the end.

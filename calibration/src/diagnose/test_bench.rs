@@ -22,7 +22,6 @@ use shared_mem::msg::MAX_JOINTS;
 use shared_mem::theta::Theta;
 use std::path::Path;
 
-/// One linearisation.
 pub(super) const ONCE: Effort = Effort::of(1, Precision::Joints);
 
 /// The parameters of the library's numbers.

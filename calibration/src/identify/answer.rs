@@ -39,7 +39,6 @@ pub struct Identification {
     pub by_clip: Vec<ClipGap>,
     /// The way of searching.
     pub optimizer: String,
-    /// Clips simulated.
     pub evaluations: usize,
     /// The program that simulated the arm; none where the twin did.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -75,11 +74,9 @@ pub struct Identification {
 /// One parameter of one or several numbers. As JSON, a single number is a number and no list.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Parameter {
-    /// The numbers.
     pub value: Vec<f64>,
     /// Their 95 % intervals; null where the clips say nothing.
     pub ci95: Vec<[f64; 2]>,
-    /// SI unit.
     pub unit: String,
     /// Where the search began: cell.toml's or the given parameters' values.
     pub start: Vec<f64>,
@@ -107,7 +104,6 @@ impl Serialize for Parameter {
 /// A number that is not identifiable from the clips.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Untold {
-    /// Its name.
     pub parameter: String,
     /// The reason, and what would help.
     pub why: String,
@@ -145,9 +141,7 @@ pub struct Gap {
 /// Files of clips by their use.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Clips {
-    /// Fitted.
     pub train: Vec<String>,
-    /// Held out.
     pub holdout: Vec<String>,
     /// Not usable, and why.
     pub left_out: Vec<LeftOut>,
@@ -156,16 +150,13 @@ pub struct Clips {
 /// A clip that was not used.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// Its file.
     pub file: String,
-    /// The reason.
     pub why: String,
 }
 
 /// How far the twin is off in one clip.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ClipGap {
-    /// Its file.
     pub file: String,
     /// `fitted` or `held out`.
     pub used: String,
@@ -194,7 +185,6 @@ pub struct Advice {
 
 impl Figures {
     /// Mean of some clips' figures.
-    #[must_use]
     pub fn mean(figures: &[Self]) -> Self {
         let of = |figure: fn(&Self) -> Option<f64>, power: i32| {
             let values: Vec<f64> = figures.iter().filter_map(figure).collect();
@@ -213,7 +203,6 @@ impl Figures {
 
 impl Identification {
     /// The same for page and terminal.
-    #[must_use]
     pub fn sheet(&self) -> Sheet {
         let parameters = self.parameters.iter().map(|(name, parameter)| self.sheet_parameter(name, parameter));
         let sets = [
@@ -280,7 +269,6 @@ impl Identification {
     }
 
     /// The finding in one sentence.
-    #[must_use]
     pub fn sentence(&self) -> String {
         let known = self.names.len() - self.not_identifiable.len().min(self.names.len());
         let figure = |f: &Figures| {

@@ -32,7 +32,6 @@ pub enum Optimizer {
 
 impl Optimizer {
     /// Name on command lines and in answers.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::LeastSquares => "least-squares",
@@ -60,7 +59,6 @@ pub(super) struct Run<'a> {
 /// The end of a search.
 pub(super) struct Outcome {
     pub(super) fit: Fit,
-    /// Clips simulated.
     pub(super) simulated: usize,
     /// Clips simulated so far, and the loss then: mean squared residual in sigmas.
     pub(super) convergence: Vec<[f64; 2]>,
@@ -70,7 +68,6 @@ pub(super) struct Outcome {
 /// A search ended without an answer.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The model.
     #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
     Impossible(#[from] Impossible),
     /// Ctrl-C. What was found is kept, and the words say where.

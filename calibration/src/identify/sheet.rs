@@ -50,9 +50,7 @@ pub struct Sheet {
 pub struct Parameter {
     /// Name in files.
     pub name: String,
-    /// SI unit.
     pub unit: String,
-    /// The numbers.
     pub values: Vec<f64>,
     /// Their 95 % intervals.
     pub intervals: Vec<[f64; 2]>,
@@ -67,7 +65,6 @@ pub struct Parameter {
 pub struct Error {
     /// Which error, on which clips.
     pub name: String,
-    /// SI unit.
     pub unit: String,
     /// With what cell.toml says; none where it says too little to simulate.
     pub before: Option<f64>,
@@ -75,10 +72,8 @@ pub struct Error {
     pub after: f64,
 }
 
-/// One clip.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Clip {
-    /// Its file.
     pub file: String,
     /// What it was used for: `fitted`, `held out`, `left out`.
     pub used: String,

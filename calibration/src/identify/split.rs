@@ -24,7 +24,6 @@ pub struct Split {
 }
 
 /// Holds a quarter of the motions out, at least one of two. The same seed draws the same.
-#[must_use]
 pub fn split(clips: &[&Clip], seed: u64) -> Split {
     let groups = groups(clips);
     let mut order: Vec<usize> = (0..groups.len()).collect();

@@ -7,7 +7,6 @@ use std::path::PathBuf;
 /// What a person says. Absent: nobody said so.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Facts {
-    /// The arm.
     pub robot: Option<Named>,
     /// With a URDF: which of its joints are the arm's, from base to flange, or what recordings call them.
     pub joints: Vec<String>,

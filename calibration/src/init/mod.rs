@@ -56,7 +56,6 @@ pub struct Taken {
 /// What was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Written {
-    /// The cell.toml.
     pub file: PathBuf,
     /// The URDF beside it, where one was expanded or taken out of a bag.
     pub urdf: Option<PathBuf>,

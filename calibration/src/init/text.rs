@@ -120,7 +120,6 @@ pub(super) fn not_known(cell: &Cell) -> Vec<&'static str> {
     BLOCKS.iter().map(|(block, _)| *block).filter(|block| !table.contains_key(*block)).collect()
 }
 
-/// The text.
 pub(super) fn of(known: &Known) -> String {
     let (schema, values) = (Cell::schema(), values(&known.cell));
     let mut text = HEAD.to_owned();

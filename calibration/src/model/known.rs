@@ -48,7 +48,6 @@ pub struct Line {
     pub of: String,
     /// What it is, in words.
     pub what: &'static str,
-    /// Its numbers.
     pub values: Vec<f64>,
     /// SI unit; `1` without.
     pub unit: &'static str,

@@ -24,11 +24,8 @@ use sheet::Sheet;
 /// A format of models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// MuJoCo.
     Mjcf,
-    /// ROS.
     Urdf,
-    /// Gazebo.
     Sdf,
 }
 

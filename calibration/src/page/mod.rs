@@ -25,19 +25,16 @@ pub use share::percent;
 pub use trace::Trace;
 
 /// Root mean square over the joints.
-#[must_use]
 pub fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 /// A name of files as words: `command delay` of `command_delay`.
-#[must_use]
 pub fn words(name: &str) -> String {
     name.replace('_', " ")
 }
 
 /// A channel as words: `joint2` as `joint 2`, others as they are.
-#[must_use]
 pub fn channel_in_words(channel: &str) -> String {
     match channel.strip_prefix("joint") {
         Some(number) if !number.is_empty() && number.bytes().all(|c| c.is_ascii_digit()) => format!("joint {number}"),

@@ -10,7 +10,6 @@ use twin::effects::{Shape, find};
 /// A parameter of one or several numbers, in SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Size {
-    /// The numbers.
     pub values: Vec<f64>,
     /// A 90 % interval each.
     pub ci90: Vec<[f64; 2]>,
@@ -20,7 +19,6 @@ pub struct Size {
 
 impl Size {
     /// Whether the `k`-th number was fitted; else it was held at its default, and its interval has no width.
-    #[must_use]
     pub fn is_fitted(&self, k: usize) -> bool {
         self.ci90.get(k).is_none_or(|[low, high]| high > low)
     }
@@ -49,9 +47,7 @@ pub(crate) struct Numbers<'a> {
     pub(crate) name: &'a str,
     /// Whether there is one number a joint.
     pub(crate) joints: bool,
-    /// SI unit.
     pub(crate) unit: &'a str,
-    /// The numbers.
     pub(crate) values: &'a [f64],
     /// An interval each.
     pub(crate) intervals: &'a [[f64; 2]],
@@ -112,7 +108,6 @@ impl Numbers<'_> {
 }
 
 /// An effect with what was fitted of it: `command delay (delay 11.9 ms)`; what was held at its default is left out.
-#[must_use]
 pub fn effect_in_words(effect: &str, parameters: &BTreeMap<String, Size>) -> String {
     let fitted = parameters.iter().filter(|(_, size)| (0..size.values.len()).any(|k| size.is_fitted(k)));
     let sizes: Vec<String> = fitted.map(|(name, size)| numbers(effect, name, size).brief()).collect();
@@ -127,7 +122,6 @@ pub(crate) fn numbers<'a>(effect: &str, name: &'a str, size: &'a Size) -> Number
 }
 
 /// A number by its name in files as words: `stiffness[4]` as `stiffness, joint 5`, `centre_of_mass[0]` as `centre of mass, x`.
-#[must_use]
 pub fn number_in_words(name: &str) -> String {
     let split = name.strip_suffix(']').and_then(|rest| rest.split_once('['));
     let Some((parameter, Ok(k))) = split.map(|(parameter, k)| (parameter, k.parse::<usize>())) else {

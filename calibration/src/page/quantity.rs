@@ -64,7 +64,6 @@ impl Unit {
 }
 
 /// A value in SI with the prefix that suits it: `2.13 mrad`.
-#[must_use]
 pub fn in_unit(si: &str, value: f64) -> String {
     Unit::suited(si, value).with_unit(value)
 }

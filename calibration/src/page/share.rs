@@ -6,7 +6,6 @@ use super::quantity::Unit;
 const NEARLY_ALL: f64 = 0.9999;
 
 /// A share as percent: `41 %`, `0.4 %`, `99.97 %`.
-#[must_use]
 pub fn percent(share: f64) -> String {
     if share > NEARLY_ALL && share < 1.0 {
         return "> 99.99 %".into();

@@ -69,7 +69,6 @@ fn pieces(points: &[[f64; 2]]) -> Vec<&[[f64; 2]]> {
 }
 
 /// The worst channel of each of the worst `clips` clips, worst first.
-#[must_use]
 pub fn worst_first(traces: &[Trace], clips: usize) -> Vec<&Trace> {
     let mut sorted: Vec<&Trace> = traces.iter().collect();
     sorted.sort_by(|a, b| b.size().total_cmp(&a.size()));

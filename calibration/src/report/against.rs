@@ -10,8 +10,6 @@ use crate::page::share::{limited, percent_interval, probability};
 use crate::page::words;
 use maud::{Markup, html};
 
-/// The page.
-#[must_use]
 pub fn page(found: &Comparison) -> String {
     let body = html! {
         (head(found))

@@ -10,7 +10,6 @@ use crate::page::words;
 use maud::{Markup, html};
 
 /// The page. The first method is the one in question, the others stand beside it. `origin`: the command, the time it took.
-#[must_use]
 pub fn page(methods: &[Method], origin: &str) -> String {
     let scores: Vec<(&str, Scores)> =
         methods.iter().map(|method| (method.name.as_str(), Scores::of(&method.cases))).collect();
@@ -28,7 +27,6 @@ pub fn page(methods: &[Method], origin: &str) -> String {
 }
 
 /// The finding in one sentence.
-#[must_use]
 pub fn sentence(scores: &Scores) -> String {
     let Rate { hits, of, ci95 } = scores.false_alarms;
     format!(

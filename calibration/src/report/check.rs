@@ -22,7 +22,6 @@ fn severity(severity: Severity) -> (&'static str, &'static str) {
 }
 
 /// The whole in one sentence.
-#[must_use]
 pub fn sentence(found: &Checked) -> String {
     let count = |wanted: Severity| found.remarks.iter().filter(|remark| remark.severity == wanted).count();
     let [wrong, warnings, notes] = [Severity::Wrong, Severity::Warning, Severity::Note].map(count);
@@ -49,7 +48,6 @@ fn size(size: &Size) -> String {
 }
 
 /// Lines for a terminal, the sentence last.
-#[must_use]
 pub fn words(found: &Checked) -> String {
     let mut lines = vec![format!("origin: {}", found.origin)];
     for remark in &found.remarks {
@@ -91,8 +89,6 @@ pub fn words(found: &Checked) -> String {
     lines.join("\n")
 }
 
-/// The page.
-#[must_use]
 pub fn page(found: &Checked) -> String {
     let body = html! {
         p.kicker { "The recording " b { (found.session) } }

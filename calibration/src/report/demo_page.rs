@@ -39,7 +39,6 @@ const FOUND: &str = "twin with what was found";
 
 impl Story {
     /// The finding in one sentence.
-    #[must_use]
     pub fn sentence(&self) -> String {
         let [before, after] = [&self.before, &self.after].map(|gap| 1e3 * root_mean_square(gap));
         format!(
@@ -50,7 +49,6 @@ impl Story {
     }
 
     /// The whole page.
-    #[must_use]
     pub fn page(&self) -> String {
         let joint = self.joint + 1;
         let body = html! {

@@ -30,7 +30,6 @@ pub struct Sheet<'a> {
 }
 
 /// The findings in one sentence.
-#[must_use]
 pub fn sentence(findings: &Findings) -> String {
     for pair in &findings.worlds {
         if let Some(agreement) = pair.agreement {
@@ -56,8 +55,6 @@ fn interval(value: f64, [low, high]: [f64; 2]) -> String {
 }
 
 impl Sheet<'_> {
-    /// The page.
-    #[must_use]
     pub fn page(&self) -> String {
         let found = self.findings;
         let trials: u64 = found.cells.iter().map(|cell| cell.share.trials).sum();
@@ -279,7 +276,6 @@ fn chance(p: f64) -> String {
 }
 
 /// The findings for a terminal.
-#[must_use]
 pub fn words(found: &Findings, out: &Path) -> String {
     let mut text = String::new();
     for cell in &found.cells {

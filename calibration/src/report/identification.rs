@@ -18,8 +18,6 @@ const SHOWN_CLIPS: usize = 3;
 const SHOWN_ERRORS: usize = 3;
 
 impl Sheet {
-    /// The page.
-    #[must_use]
     pub fn page(&self) -> String {
         let body = html! {
             p.kicker { "Identification of the " (self.target) " from " b { (self.session) } }

@@ -19,7 +19,6 @@ use crate::page::words;
 const SHOWN_PLACES: usize = 3;
 
 /// An identification: each number with its interval and what was believed, the errors, what is not identifiable, what to do next.
-#[must_use]
 pub fn identification(sheet: &Sheet) -> String {
     let mut lines = table(sheet.parameters.iter().flat_map(numbers).collect());
     lines.extend((!sheet.origin.is_empty()).then(|| format!("origin: {}", sheet.origin)));
@@ -48,7 +47,6 @@ fn not_identifiable(all: &[[String; 2]]) -> Vec<String> {
 }
 
 /// A diagnosis: gap, place, candidates in question, how many others, what to do next, and the verdict.
-#[must_use]
 pub fn diagnosis(diagnosis: &Diagnosis) -> String {
     let mut lines = if is_known(diagnosis) { gap(diagnosis) } else { Vec::new() };
     let mut places: Vec<_> = diagnosis.places.iter().collect();
@@ -91,7 +89,6 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
 }
 
 /// A comparison of two sessions: B's gap, what changed number by number, and the verdict.
-#[must_use]
 pub fn comparison(found: &Comparison) -> String {
     let gap = &found.gap;
     let both = matches!(found.verdict.kind, Kind::Named | Kind::Class);
@@ -200,7 +197,6 @@ fn numbers(parameter: &Parameter) -> Vec<Vec<String>> {
 }
 
 /// A benchmark: each rate of each method, and the finding.
-#[must_use]
 pub fn benchmark(methods: &[Method]) -> String {
     let scores: Vec<Scores> = methods.iter().map(|method| Scores::of(&method.cases)).collect();
     let head = std::iter::once(String::new()).chain(methods.iter().map(|method| method.name.clone()));
@@ -218,7 +214,6 @@ pub fn benchmark(methods: &[Method]) -> String {
 }
 
 /// Criteria of a diagnosis, and what labelled sessions make of them.
-#[must_use]
 pub fn criteria(rows: &[Regenerated]) -> String {
     let head = ["", "in use", "from sessions", "sessions", "unit"].map(str::to_owned).to_vec();
     let line = |row: &Regenerated| {

@@ -29,9 +29,7 @@ pub struct World {
 /// What is to be done.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// Who acts.
     pub policies: Vec<Named>,
-    /// Where.
     pub worlds: Vec<World>,
     /// Starts of each task, the same for all.
     pub episodes: u64,
@@ -44,7 +42,6 @@ pub struct Plan {
 /// A trial and what came of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Done {
-    /// The trial.
     pub trial: Trial,
     /// What came of it.
     pub outcome: Outcome,

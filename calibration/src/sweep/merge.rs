@@ -15,7 +15,6 @@ pub struct Merged {
     pub answers: String,
     /// All trials, where the units are evaluations: as a table, and what they say.
     pub trials: Option<(String, Findings)>,
-    /// Units.
     pub units: usize,
     /// What they took together [s].
     pub seconds: f64,
@@ -85,7 +84,6 @@ fn together(trials: &[Trial]) -> Result<(String, Findings), SweepError> {
 
 impl Merged {
     /// What it is, in numbers.
-    #[must_use]
     pub fn summary(&self) -> Value {
         let findings = self.trials.as_ref().map(|(_, findings)| findings);
         json!({ "units": self.units, "seconds": self.seconds, "findings": findings })

@@ -60,10 +60,8 @@ pub enum SweepError {
     /// The end was asked for.
     #[error("interrupted; nothing was written, and the same command starts again")]
     Interrupted,
-    /// Units failed.
     #[error("{failed} of {units} units failed, the first, {number}: {why}; mend it and start the same command again")]
     Failed {
-        /// How many.
         failed: usize,
         /// Of so many.
         units: usize,

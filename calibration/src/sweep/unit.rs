@@ -32,11 +32,9 @@ pub struct Slice {
 }
 
 impl Slice {
-    /// All units.
     pub const WHOLE: Self = Self { k: 1, n: 1 };
 
     /// Whether a unit belongs to it.
-    #[must_use]
     pub fn holds(self, unit: &Unit) -> bool {
         unit.unit % self.n == self.k - 1
     }

@@ -29,7 +29,6 @@ pub struct Ran {
     pub units: usize,
     /// Of which had a result before.
     pub before: usize,
-    /// Run now.
     pub now: usize,
 }
 

@@ -19,7 +19,6 @@ pub(crate) struct Driven<'a> {
     pub(crate) cell: &'a Cell,
     /// What is true besides.
     pub(crate) hidden: &'a str,
-    /// Clips.
     pub(crate) clips: u32,
     /// Control periods of each.
     pub(crate) periods: u64,

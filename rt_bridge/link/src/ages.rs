@@ -21,7 +21,6 @@ impl Ages {
     ///
     /// # Panics
     /// Never: the bounds are constants that the histogram accepts.
-    #[must_use]
     pub fn new() -> Self {
         Self(Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("constant bounds are valid"))
     }
@@ -37,7 +36,6 @@ impl Ages {
     }
 
     /// Percentiles; `None` where nothing was counted.
-    #[must_use]
     pub fn percentiles(&self) -> Option<Percentiles> {
         let at = |quantile: f64| self.0.value_at_quantile(quantile) as f64 * 1e-3;
         let max = self.0.max() as f64 * 1e-3;

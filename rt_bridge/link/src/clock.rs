@@ -38,7 +38,6 @@ pub struct Offset {
 
 impl Offset {
     /// A stamp of the other host in this host's clock [ns].
-    #[must_use]
     pub fn here(self, stamp_ns: u64) -> u64 {
         stamp_ns.saturating_add_signed(self.ns.saturating_neg())
     }
@@ -75,7 +74,6 @@ impl ClockEstimate {
     }
 
     /// The offset as of `now_ns` of this host's clock; `None` before the first round trip.
-    #[must_use]
     pub fn at(&self, now_ns: u64) -> Option<Offset> {
         let widened = self.trips.iter().map(|(offset, at_ns)| {
             let drift = now_ns.saturating_sub(*at_ns) as f64 * DRIFT;
@@ -85,7 +83,6 @@ impl ClockEstimate {
     }
 
     /// Round trips so far.
-    #[must_use]
     pub fn round_trips(&self) -> u64 {
         self.round_trips
     }

@@ -55,7 +55,6 @@ impl EncodedVisitor for All {
 }
 
 /// Every topic that can cross.
-#[must_use]
 pub fn all() -> Vec<Crossing> {
     let mut all = All(Vec::new());
     visit_encoded(&mut all);
@@ -63,7 +62,6 @@ pub fn all() -> Vec<Crossing> {
 }
 
 /// What a bridge and its devices say: what crosses unless other topics are named.
-#[must_use]
 pub fn of_the_cell() -> Vec<Crossing> {
     let is_cells = |crossing: &Crossing| crossing.kind != Kind::Command && !OF_THE_TWIN.contains(&crossing.topic);
     all().into_iter().filter(is_cells).collect()

@@ -13,7 +13,6 @@ pub struct Endpoint {
 
 impl Endpoint {
     /// Host and port.
-    #[must_use]
     pub fn address(&self) -> String {
         format!("{}:{}", self.host, self.port)
     }

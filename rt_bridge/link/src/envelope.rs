@@ -31,7 +31,6 @@ pub enum NoEnvelope {
 
 impl Envelope {
     /// As bytes, numbers in little endian.
-    #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(LENGTH);
         bytes.push(VERSION);

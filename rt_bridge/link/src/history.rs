@@ -42,7 +42,6 @@ pub struct Due<T> {
 
 impl<T: Clone> History<T> {
     /// Nothing kept yet, at most so many messages and bytes.
-    #[must_use]
     pub fn new(most_messages: usize, most_bytes: usize) -> Self {
         let most_messages = most_messages.max(1);
         Self { kept: VecDeque::new(), oldest: 0, bytes: 0, next: 0, most_messages, most_bytes }

@@ -15,6 +15,7 @@
 //! | `network` | zenoh, behind the feature `zenoh` |
 //!
 //! Everything but `network` is free of sockets and tested without any.
+#![warn(missing_docs)]
 
 pub mod ages;
 pub mod clock;

@@ -46,13 +46,11 @@ struct Sender {
 
 impl Order {
     /// Nothing came yet. `is_complete`: missing messages are asked for; otherwise they are counted as lost.
-    #[must_use]
     pub fn new(is_complete: bool) -> Self {
         Self { is_complete, sender: None }
     }
 
     /// Number of the message that is due; `None` before the first, and where what is missing is not asked for.
-    #[must_use]
     pub fn next(&self) -> Option<u64> {
         self.sender.as_ref().filter(|_| self.is_complete).map(|sender| sender.next)
     }

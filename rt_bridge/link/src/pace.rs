@@ -18,7 +18,6 @@ pub struct Pace {
 
 impl Pace {
     /// Full, as of now [ns].
-    #[must_use]
     pub fn new(now_ns: u64) -> Self {
         Self { left: AT_ONCE, filled_ns: now_ns }
     }

@@ -20,7 +20,6 @@ struct Inner<T> {
 
 impl<T> Queue<T> {
     /// For at most so many.
-    #[must_use]
     pub fn new(most: usize) -> Self {
         Self {
             inner: Mutex::new(Inner { waiting: VecDeque::new(), dropped: 0 }),
@@ -50,7 +49,6 @@ impl<T> Queue<T> {
     }
 
     /// How many were dropped so far.
-    #[must_use]
     pub fn dropped(&self) -> u64 {
         self.inner().dropped
     }

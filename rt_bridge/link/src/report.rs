@@ -67,7 +67,6 @@ pub struct Clock {
 
 impl Report {
     /// Lines for people.
-    #[must_use]
     pub fn in_words(&self) -> String {
         let mut lines = Vec::new();
         let sent = self.sent.iter().filter(|sent| sent.messages > 0);
@@ -93,7 +92,6 @@ impl Report {
 
 impl Clock {
     /// One line for people.
-    #[must_use]
     pub fn in_words(&self) -> String {
         format!(
             "the other host's clock is {:+.6} s from this one's, to within {:.0} us",
@@ -104,7 +102,6 @@ impl Clock {
 }
 
 /// `p50 0.21 ms, p99 0.80 ms`
-#[must_use]
 pub fn in_words(age: &Percentiles) -> String {
     format!("p50 {:.2} ms, p99 {:.2} ms", age.p50 * 1e-3, age.p99 * 1e-3)
 }

@@ -45,7 +45,6 @@ pub enum ArmFault {
 
 impl ArmFault {
     /// `true` when nothing more will come from this arm: the run ends. Otherwise states go on being read and published.
-    #[must_use]
     pub fn is_final(self) -> bool {
         matches!(self, Self::Silent { .. } | Self::Disconnected | Self::Socket { .. })
     }
@@ -111,9 +110,7 @@ pub enum ConnectError {
     Version {
         /// Address as given.
         host: String,
-        /// Its version.
         theirs: u16,
-        /// Ours.
         ours: u16,
         /// What theirs belongs to, and what to do.
         remedy: String,
@@ -129,7 +126,6 @@ pub enum ConnectError {
     Refused {
         /// Address as given.
         host: String,
-        /// Its reason.
         what: String,
     },
 }

@@ -53,25 +53,20 @@ pub struct ReflexErrors(u64);
 
 impl ReflexErrors {
     /// From bits, bit i for error i.
-    #[must_use]
     pub fn from_bits(bits: u64) -> Self {
         Self(bits)
     }
 
     /// From the protocol's array of flags.
-    #[must_use]
     pub fn from_flags(flags: &[bool]) -> Self {
         Self(flags.iter().take(64).enumerate().fold(0, |bits, (i, set)| bits | u64::from(*set) << i))
     }
 
-    /// The bits.
-    #[must_use]
     pub fn bits(self) -> u64 {
         self.0
     }
 
     /// `true` when nothing is objected to.
-    #[must_use]
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }

@@ -46,13 +46,10 @@ pub enum CameraError {
     /// The splats of its robot.
     #[error(transparent)]
     Splats(#[from] twin::render::session::ViewError),
-    /// The recording.
     #[error(transparent)]
     Clip(#[from] ReadError),
-    /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// Its thread.
     #[error(transparent)]
     Thread(#[from] ThreadError),
 }

@@ -28,7 +28,6 @@ impl fmt::Display for CameraSource {
 /// What became of a recording: the JSON answer of `rt_bridge convert`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Converted {
-    /// The clip.
     pub file: PathBuf,
     /// Pairs of colour and depth in it.
     pub frames: usize,
@@ -46,7 +45,6 @@ pub enum ConvertError {
     /// The recording, or the library to read it.
     #[error(transparent)]
     Device(#[from] DeviceFault),
-    /// The clip.
     #[error(transparent)]
     Write(#[from] WriteError),
     /// What a pass wrote.
@@ -54,10 +52,7 @@ pub enum ConvertError {
     Read(#[from] ReadError),
     /// Nothing in it.
     #[error("{} holds no pair of colour and depth; record both streams", path.display())]
-    Empty {
-        /// The recording.
-        path: PathBuf,
-    },
+    Empty { path: PathBuf },
     /// The clip's file.
     #[error(transparent)]
     Output(#[from] OutputError),

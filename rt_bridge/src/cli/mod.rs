@@ -56,7 +56,6 @@ enum Verb {
 const LOGGED: &str = "info,zenoh=off";
 
 /// Reads the command line and does what it says.
-#[must_use]
 pub fn main(build: &Build) -> ExitCode {
     let _last_lines = console::start();
     let arguments: Arguments = match command_line::parse(build) {

@@ -6,7 +6,6 @@ pub enum DeviceFault {
     /// There is no way to it.
     #[error("{device} cannot be opened ({why}); {remedy}")]
     NotOpened {
-        /// The device.
         device: String,
         /// What the system said.
         why: String,
@@ -16,7 +15,6 @@ pub enum DeviceFault {
     /// It was there and is not any more.
     #[error("{device} is gone ({why}); plug it in again, it is taken up by itself")]
     Gone {
-        /// The device.
         device: String,
         /// What the system said.
         why: String,
@@ -24,7 +22,6 @@ pub enum DeviceFault {
     /// The way is there, nobody answers.
     #[error("{device} does not answer; check {check}; it is taken up by itself when it does")]
     Silent {
-        /// The device.
         device: String,
         /// What to look at.
         check: &'static str,
@@ -32,7 +29,6 @@ pub enum DeviceFault {
     /// Somebody answers, not as this device does.
     #[error("{device} answers garbled ({why}); check {check}")]
     Garbled {
-        /// The device.
         device: String,
         /// What is wrong with the answers.
         why: String,
@@ -44,7 +40,6 @@ pub enum DeviceFault {
         "{device}: the bus is off after too many errors; check its bit rate and the 120 ohm at both ends, then `ip link set {interface} down` and `ip link set {interface} up`"
     )]
     BusOff {
-        /// The device.
         device: String,
         /// Its network interface.
         interface: String,

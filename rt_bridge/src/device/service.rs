@@ -40,13 +40,10 @@ pub struct Service {
 /// A device cannot be taken into service.
 #[derive(Debug, thiserror::Error)]
 pub enum ServiceError {
-    /// The device.
     #[error(transparent)]
     Device(#[from] DeviceFault),
-    /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// Its thread.
     #[error(transparent)]
     Thread(#[from] ThreadError),
 }
@@ -92,7 +89,6 @@ impl Service {
     }
 
     /// Ends it; what was still wrong then.
-    #[must_use]
     pub fn finish(mut self) -> Option<String> {
         self.end()
     }

@@ -65,7 +65,6 @@ pub struct Report {
 pub struct Reach {
     /// Address of a robot.
     pub robot: Option<String>,
-    /// A gripper.
     pub gripper: Option<GripperChoice>,
     /// A force/torque sensor.
     pub wrench: Option<WrenchChoice>,
@@ -74,7 +73,6 @@ pub struct Reach {
 }
 
 /// Looks at everything.
-#[must_use]
 pub fn examine(reach: &Reach) -> Report {
     let root = Path::new("/");
     let mut findings = communication::judge(&readings::read(root, reach.robot.as_deref()));

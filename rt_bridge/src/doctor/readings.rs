@@ -13,7 +13,6 @@ const PORT: u16 = 1337;
 /// Of the machine.
 #[derive(Debug, Clone)]
 pub(super) struct Readings {
-    /// The kernel's.
     pub(super) version: String,
     /// It is PREEMPT_RT.
     pub(super) is_realtime: bool,

@@ -63,7 +63,6 @@ pub fn connect(host: &str, realtime: Realtime, cell: &Cell) -> Result<Box<dyn Ar
 struct Fr3 {
     session: Session,
     settings: Settings,
-    /// Newest state.
     wire: RobotState,
     motion: Option<Motion>,
     /// Newest set point, repeated at the end of the motion.

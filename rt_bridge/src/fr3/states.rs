@@ -19,13 +19,11 @@ const DATAGRAM: usize = 1500;
 pub(super) enum Heard {
     /// A state that is believed.
     State,
-    /// Something else.
     Other,
     /// Nothing within the patience of the socket.
     Nothing,
 }
 
-/// The socket.
 #[derive(Debug)]
 pub(super) struct States {
     socket: UdpSocket,

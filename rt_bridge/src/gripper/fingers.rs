@@ -13,7 +13,6 @@ pub(crate) struct Reach {
 /// How an action ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// As asked.
     Success,
     /// Nothing of the asked size was there.
     Unsuccessful,
@@ -44,7 +43,6 @@ pub(crate) enum Action {
     },
 }
 
-/// The fingers.
 #[derive(Debug, Clone)]
 pub(crate) struct Fingers {
     reach: Reach,

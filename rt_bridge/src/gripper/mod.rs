@@ -40,10 +40,8 @@ pub(crate) const FRANKA_HAND: Reach = Reach { widest: 0.08, fastest: 0.1 };
 /// A gripper that was reached.
 pub type AnyGripper = Box<dyn Device<Sample = GripperState, Order = GripperCommand>>;
 
-/// Which gripper.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum GripperChoice {
-    /// Simulated fingers.
     Sim,
     /// A Robotiq 2F at this serial port.
     Serial(PathBuf),
@@ -51,7 +49,6 @@ pub enum GripperChoice {
     Fci(String),
     /// What a recording holds of one.
     Replay,
-    /// None.
     Off,
 }
 

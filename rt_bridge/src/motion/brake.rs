@@ -25,7 +25,6 @@ pub struct BrakeStep {
 
 impl Brake {
     /// A brake for an arm with `limits`, at rest.
-    #[must_use]
     pub fn new(limits: Limits, period_s: f64) -> Self {
         let way = Stopping::of(&Trace::at_rest([0.0; MAX_JOINTS]), &limits, period_s);
         Self { way, limits, period_s, periods: 0 }

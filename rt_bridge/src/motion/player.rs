@@ -71,7 +71,6 @@ pub struct Player {
 
 impl Player {
     /// Holds `q_d`.
-    #[must_use]
     pub fn new(guard: Guard, q_d: Joints) -> Self {
         Self {
             brake: Brake::new(guard.limits, guard.period_s),
@@ -132,13 +131,11 @@ impl Player {
     }
 
     /// `true` when a further chunk fits; else it stays with the sender.
-    #[must_use]
     pub fn has_room(&self) -> bool {
         self.queue.len + CHUNK_LENGTH <= QUEUE
     }
 
     /// `true` when nothing moves and nothing is about to.
-    #[must_use]
     pub fn is_at_rest(&self) -> bool {
         match self.activity {
             Activity::Holding => self.ease.is_over(),

@@ -31,10 +31,7 @@ pub enum ChildError {
     Refused(String),
     /// It did not answer.
     #[error("the recorder did not open {} within {} s; look at the disk, or run without --record", file.display(), START_PATIENCE.as_secs())]
-    Slow {
-        /// The file.
-        file: PathBuf,
-    },
+    Slow { file: PathBuf },
 }
 
 /// What became of the recorder since the last look.
@@ -124,7 +121,6 @@ impl RecorderChild {
 
     /// Asks the recorder to finish and returns what it recorded, and what went wrong at the end. Files of recorders that were
     /// killed before are not counted: nobody knows what is in them before they are read.
-    #[must_use]
     pub fn finish(mut self) -> (Option<Recorded>, Option<String>) {
         let mut fault = None;
         if let Some(mut child) = self.running.take() {

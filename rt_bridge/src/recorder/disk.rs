@@ -17,7 +17,6 @@ pub(super) enum Room {
         /// Free [MB].
         megabytes: u64,
     },
-    /// Stop.
     TooLittleToGoOn {
         /// Free [MB].
         megabytes: u64,

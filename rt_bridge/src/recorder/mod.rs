@@ -48,11 +48,9 @@ pub struct Settings {
 /// What was recorded: the JSON answer of `rt_bridge record` and the `recorded` of `rt_bridge run`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, serde::Deserialize)]
 pub struct Recorded {
-    /// The file.
     pub file: PathBuf,
     /// Messages in it.
     pub messages: u64,
-    /// Its size.
     pub bytes: u64,
     /// Messages that were overwritten before they could be recorded.
     pub lost: u64,
@@ -62,7 +60,6 @@ pub struct Recorded {
 
 impl Recorded {
     /// One line for people.
-    #[must_use]
     pub fn in_words(&self) -> String {
         let (megabytes, file) = (self.bytes as f64 * 1e-6, self.file.display());
         format!("recorded {} messages, {megabytes:.1} MB in {file}", self.messages)
@@ -77,27 +74,19 @@ pub enum RecordError {
         "only {megabytes} MB are free where {} is to be written, less than the {} MB that recording starts with; free some space or record to another disk",
         path.display(), disk::NEEDED_TO_START / 1_000_000
     )]
-    NoRoom {
-        /// The file.
-        path: PathBuf,
-        /// Free space.
-        megabytes: u64,
-    },
+    NoRoom { path: PathBuf, megabytes: u64 },
     /// Nobody sent anything, so there is no recording.
     #[error(
         "nothing was sent within {:.1} s, so nothing was recorded and {} was removed; start a bridge with `rt_bridge run --cell cell.toml --arm sim` (a robot: --arm fci://HOST)",
         waited.as_secs_f64(), path.display()
     )]
     Nothing {
-        /// The file.
         path: PathBuf,
         /// How long it was waited.
         waited: Duration,
     },
-    /// The file.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
 }

@@ -6,7 +6,6 @@ use std::io;
 /// The answer, as the kernel's error numbers; none where it granted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Claim {
-    /// Locked memory.
     pub(crate) memory: Option<i32>,
     /// `SCHED_FIFO`.
     pub(crate) fifo: Option<i32>,
@@ -14,7 +13,6 @@ pub struct Claim {
 
 impl Claim {
     /// `true` when everything was granted.
-    #[must_use]
     pub fn is_complete(&self) -> bool {
         self.memory.is_none() && self.fifo.is_none()
     }

@@ -15,39 +15,31 @@ use std::fmt;
 pub enum Remark {
     /// The loop runs without some real-time guarantee.
     LesserClock(Claim),
-    /// Commanding ended.
     Fault(ArmFault),
     /// A reflex was cleared: commanding goes on.
     Recovered,
     /// A motion was refused before it began, or its sender's chunks do not count.
     Refused {
-        /// The motion.
         motion: u64,
-        /// Why.
         why: Refusal,
     },
     /// A motion began to play.
     Began {
-        /// The motion.
         motion: u64,
     },
     /// A motion was played to its end.
     Done {
-        /// The motion.
         motion: u64,
     },
     /// A target of a stream was passed over; the arm goes on to the one before it.
     PassedOver {
-        /// The stream.
         motion: u64,
         /// What resting there would break.
         why: Violation,
     },
     /// A motion is being braked; the arm will hold where it comes to rest.
     Braked {
-        /// The motion.
         motion: u64,
-        /// Why.
         why: BrakeReason,
     },
 }
@@ -56,10 +48,7 @@ pub enum Remark {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
     /// Another motion is being played or braked.
-    Busy {
-        /// That motion.
-        playing: u64,
-    },
+    Busy { playing: u64 },
     /// The first set point is not where the arm is commanded to be.
     StartsElsewhere {
         /// First joint that differs.
@@ -116,7 +105,6 @@ pub enum BrakeReason {
 
 impl Remark {
     /// How serious it is.
-    #[must_use]
     pub fn level(&self) -> EventLevel {
         match self {
             Self::Fault(_) => EventLevel::Error,

@@ -24,13 +24,10 @@ pub struct Instruments {
 /// A recording's instruments cannot be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum InstrumentError {
-    /// The recording.
     #[error(transparent)]
     Clip(#[from] ReadError),
-    /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
-    /// Its thread.
     #[error(transparent)]
     Thread(#[from] ThreadError),
 }

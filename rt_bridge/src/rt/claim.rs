@@ -8,7 +8,6 @@ impl Claim {
     /// Asks for locked memory, `SCHED_FIFO`, exact timers and a core of its own for the calling thread.
     ///
     /// Being bound to a core is a help and no guarantee (a container may own a single one), so its refusal does not count.
-    #[must_use]
     pub fn make() -> Self {
         let errno = |outcome: io::Result<()>| outcome.err().map(|e| e.raw_os_error().unwrap_or(0));
         let memory = errno(process::lock_memory());

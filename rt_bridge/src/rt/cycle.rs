@@ -52,7 +52,6 @@ pub struct Link {
 /// Whether the loop goes on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Turn {
-    /// It does.
     Continue,
     /// Nothing more will come from the arm: it was lost, or a recording is played through.
     End,
@@ -65,7 +64,6 @@ pub struct Plan {
     pub interface: CommandInterface,
     /// The law of [`CommandInterface::Torque`]; not used otherwise.
     pub law: Option<TorquePd>,
-    /// Joint limits.
     pub limits: Limits,
     /// Drawn at the start of the bridge.
     pub session: u64,
@@ -94,7 +92,6 @@ pub struct Cycle {
 
 impl Cycle {
     /// A loop that has not read yet. Allocates; what follows does not.
-    #[must_use]
     pub fn new(arm: Box<dyn Arm>, plan: Plan, player: Player, link: Link) -> Self {
         Self {
             arm,
@@ -116,13 +113,11 @@ impl Cycle {
     }
 
     /// Who says when a cycle begins.
-    #[must_use]
     pub fn clock(&self) -> Clock {
         self.arm.clock()
     }
 
     /// `true` when nothing moves by our command.
-    #[must_use]
     pub fn is_at_rest(&self) -> bool {
         !self.commanding || self.player.is_at_rest()
     }
@@ -227,7 +222,6 @@ impl Cycle {
     }
 
     /// Lets the arm go and returns what was measured.
-    #[must_use]
     pub fn finish(mut self) -> LoopStats {
         if self.commanding {
             self.arm.stop();

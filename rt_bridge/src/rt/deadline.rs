@@ -19,14 +19,12 @@ pub struct Wake {
 
 impl Grid {
     /// A grid whose first deadline is one period after `now_ns`. A period of 0 counts as 1 ns.
-    #[must_use]
     pub fn new(now_ns: u64, period_ns: u64) -> Self {
         let period_ns = period_ns.max(1);
         Self { period_ns, next_ns: now_ns + period_ns }
     }
 
     /// The deadline to sleep for [ns].
-    #[must_use]
     pub fn next_ns(&self) -> u64 {
         self.next_ns
     }

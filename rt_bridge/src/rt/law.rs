@@ -16,19 +16,16 @@ pub struct TorquePd {
 
 impl TorquePd {
     /// The gains of `law` on `arm`.
-    #[must_use]
     pub fn new(law: &ControlLaw, arm: ArmModel) -> Self {
         Self { stiffness: law.stiffness, damping: law.damping, arm }
     }
 
     /// How the arm comes after its commands under this law.
-    #[must_use]
     pub fn trailing(&self) -> Option<Trailing> {
         Trailing::impedance(&self.arm, &self.stiffness, &self.damping)
     }
 
     /// The torque that answers a state, without gravity [N m].
-    #[must_use]
     pub fn torque(&self, state: &JointState, point: &SetPoint) -> Joints {
         let coriolis = self.arm.coriolis(state);
         let mut tau_J_d = [0.0; MAX_JOINTS];

@@ -44,7 +44,6 @@ pub struct Orders {
 }
 
 /// The two ends of a way on which `in_ring` chunks have room, and `most_held` before it. Allocates; what follows does not.
-#[must_use]
 pub fn orders(in_ring: usize, most_held: usize) -> (OrderSender, Orders) {
     let (to_control, chunks) = RingBuffer::new(in_ring);
     let valid_from = Arc::new(AtomicU64::new(0));
@@ -101,7 +100,6 @@ impl OrderSender {
     }
 
     /// `true` when the loop has taken everything.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.held.is_empty() && self.chunks.slots() == self.chunks.buffer().capacity()
     }

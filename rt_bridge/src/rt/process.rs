@@ -46,7 +46,6 @@ pub fn pin_to(core: usize) -> io::Result<()> {
 }
 
 /// The highest-numbered core this process may use: interrupts and other programs crowd the first ones.
-#[must_use]
 pub fn last_core() -> Option<usize> {
     // SAFETY: an all-zero cpu_set_t is the empty set.
     let mut set = unsafe { MaybeUninit::<libc::cpu_set_t>::zeroed().assume_init() };
@@ -72,7 +71,6 @@ pub fn lock_memory() -> io::Result<()> {
 }
 
 /// `true` when no limit stands in the way of locking all memory: the limit is infinite, or the superuser asks.
-#[must_use]
 pub fn may_lock_all_memory() -> bool {
     // SAFETY: takes nothing and cannot fail.
     let superuser = unsafe { libc::geteuid() } == 0;

@@ -24,11 +24,8 @@ pub struct LoopStats {
     pub dropped: u64,
     /// Commands whose torque was held back by its limit or its rate.
     pub clamped: u64,
-    /// Wake-up latency.
     pub wake: Times,
-    /// Execution time.
     pub exec: Times,
-    /// Period.
     pub period: Times,
 }
 

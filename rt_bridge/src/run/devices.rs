@@ -27,14 +27,12 @@ use twin::arm::{ArmModel, ControlLaw, HeldJoint};
 use twin::effects::CameraEffects;
 use twin::scene::SceneSnapshot;
 
-/// Which arm.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ArmChoice {
     /// The simulated cell.
     Sim,
     /// A Franka robot at this address.
     Fci(String),
-    /// A recording.
     Replay(PathBuf),
 }
 
@@ -71,7 +69,6 @@ pub enum ControllerChoice {
     JointImpedance,
 }
 
-/// Which camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CameraChoice {
     /// Rendered from the simulated cell.
@@ -80,7 +77,6 @@ pub enum CameraChoice {
     RealSense(CameraSource),
     /// The pictures of the recording.
     Replay,
-    /// None.
     Off,
 }
 

@@ -58,9 +58,7 @@ const CLEAR_EVERY: Duration = Duration::from_secs(1);
 /// What to run.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// cell.toml.
     pub cell: PathBuf,
-    /// The arm.
     pub arm: ArmChoice,
     /// Who computes the torque; none: the bridge for `joint_impedance`, the arm itself for a servo and where the simulated
     /// arm hides something in its own controller.

@@ -8,7 +8,6 @@ use serde::Serialize;
 /// What a run was like. Times in microseconds; what each is counted from stands in [`crate::rt::stats`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunReport {
-    /// States received.
     pub cycles: u64,
     /// Deadlines that passed unused because the control thread woke too late.
     pub missed_cycles: u64,
@@ -20,7 +19,6 @@ pub struct RunReport {
     pub dropped: u64,
     /// Commands that a torque limit held back.
     pub clamped: u64,
-    /// Wake-up latency.
     pub wake_us: Percentiles,
     /// Execution time of a cycle.
     pub exec_us: Percentiles,

@@ -16,35 +16,17 @@ const ROUNDING: f64 = 1e-6;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Violation {
     /// A number is not finite.
-    NotFinite {
-        /// The joint.
-        joint: u8,
-    },
+    NotFinite { joint: u8 },
     /// Too near to the end of the joint's range, or beyond it.
-    Position {
-        /// The joint.
-        joint: u8,
-    },
+    Position { joint: u8 },
     /// Too fast, here or for the way that is left to the end of the range.
-    Velocity {
-        /// The joint.
-        joint: u8,
-    },
+    Velocity { joint: u8 },
     /// Speeds up or slows down too hard.
-    Acceleration {
-        /// The joint.
-        joint: u8,
-    },
+    Acceleration { joint: u8 },
     /// The acceleration jumps.
-    Jerk {
-        /// The joint.
-        joint: u8,
-    },
+    Jerk { joint: u8 },
     /// `dq_d` is not the derivative of `q_d`.
-    Inconsistent {
-        /// The joint.
-        joint: u8,
-    },
+    Inconsistent { joint: u8 },
     /// Arm or tool would leave the space they may be in, here or on the way to a stop.
     Workspace,
 }
@@ -66,7 +48,6 @@ impl fmt::Display for Violation {
 /// Limits in force and the control period.
 #[derive(Debug, Clone)]
 pub struct Guard {
-    /// Joint limits.
     pub limits: Limits,
     /// Where arm and tool may be.
     pub workspace: Workspace,

@@ -37,7 +37,6 @@ pub struct Measured {
 
 impl Measured {
     /// An arm in this state, told to rest at `q_d`.
-    #[must_use]
     pub fn at_rest(state: &JointState, q_d: &Joints, workspace: &Workspace) -> Self {
         let outside = workspace.outside_measured(&state.q);
         let mut arm = Self { state: *state, told: *q_d, rested: 0.0, hangs: [0.0; MAX_JOINTS], outside };
@@ -65,7 +64,6 @@ impl Measured {
     }
 
     /// Whether the arm stays in the workspace on its whole way to rest when it follows commands that are braked from `next` on.
-    #[must_use]
     pub fn keeps(
         &self,
         next: &Trace,
@@ -117,7 +115,6 @@ impl Measured {
     }
 
     /// The same of an arm that stays as far from its commands as it is now.
-    #[must_use]
     pub fn keeps_its_gap(&self, next: &Trace, workspace: &Workspace, limits: &Limits, period_s: f64) -> bool {
         let gap = self.gap();
         let shifted = Trace { q: std::array::from_fn(|i| next.q[i] - gap[i]), ..*next };

@@ -112,7 +112,6 @@ pub struct Moment {
 
 impl Stopping {
     /// From what was commanded last, periods of `period_s` apart. Its numbers must be finite.
-    #[must_use]
     pub fn of(trace: &Trace, limits: &Limits, period_s: f64) -> Self {
         let mut way = Self { joints: [JointStop::default(); MAX_JOINTS], dof: limits.dof, duration: 0.0 };
         for (i, joint) in limits.counted().enumerate() {
@@ -124,7 +123,6 @@ impl Stopping {
     }
 
     /// `t` seconds after it began. Joints that do not count are at 0.
-    #[must_use]
     pub fn at(&self, t: f64) -> Moment {
         let nothing = [0.0; MAX_JOINTS];
         let mut moment = Moment { q: nothing, dq: nothing, fastest: nothing, left: nothing, change: nothing };
@@ -135,7 +133,6 @@ impl Stopping {
     }
 
     /// When the last joint comes to rest [s].
-    #[must_use]
     pub fn duration(&self) -> f64 {
         self.duration
     }

@@ -30,7 +30,6 @@ pub struct Clamped {
 
 impl TorqueGuard {
     /// The torque sent last was `tau`, brought inside the limits.
-    #[must_use]
     pub fn after(tau: &Joints, limits: &Limits) -> Self {
         let mut last = [0.0; MAX_JOINTS];
         for ((last, tau), joint) in last.iter_mut().zip(tau).zip(limits.counted()) {

@@ -16,13 +16,11 @@ pub struct Trace {
 
 impl Trace {
     /// At rest at `q`.
-    #[must_use]
     pub fn at_rest(q: Joints) -> Self {
         Self { q, v: [0.0; MAX_JOINTS], a: [0.0; MAX_JOINTS] }
     }
 
     /// The trace after `q` was commanded, a period `period_s` after this one.
-    #[must_use]
     pub fn after(&self, q: &Joints, period_s: f64) -> Self {
         let mut next = Self::at_rest(*q);
         for (i, (q, q_before)) in q.iter().zip(&self.q).enumerate() {
@@ -33,7 +31,6 @@ impl Trace {
     }
 
     /// A period on at the same acceleration: what an FCI robot does where no command comes.
-    #[must_use]
     pub fn onward(&self, period_s: f64) -> Self {
         let mut next = *self;
         for (i, a) in self.a.iter().enumerate() {
@@ -44,13 +41,11 @@ impl Trace {
     }
 
     /// Velocity at the last sample [rad/s]: the difference speaks of the middle of its period, half a period ago.
-    #[must_use]
     pub fn velocity_now(&self, joint: usize, period_s: f64) -> f64 {
         self.v[joint] + 0.5 * period_s * self.a[joint]
     }
 
     /// `true` when the last three positions of the joints that count were the same to a nanoradian.
-    #[must_use]
     pub fn is_at_rest(&self, dof: usize, period_s: f64) -> bool {
         let still = |v: &f64| v.abs() * period_s < 1e-9;
         self.v.iter().take(dof).all(still) && self.a.iter().take(dof).all(|a| still(&(a * period_s)))

@@ -12,7 +12,6 @@ pub struct Watchdog {
 
 impl Watchdog {
     /// Starts to watch at `now_ns`; bears `longest_ns` of silence.
-    #[must_use]
     pub fn new(now_ns: u64, longest_ns: u64) -> Self {
         Self { last_ns: now_ns, longest_ns }
     }
@@ -23,7 +22,6 @@ impl Watchdog {
     }
 
     /// The silence so far [ms], when it is longer than what is borne.
-    #[must_use]
     pub fn expired(&self, now_ns: u64) -> Option<u32> {
         let silence = now_ns.saturating_sub(self.last_ns);
         (silence > self.longest_ns).then(|| u32::try_from(silence / 1_000_000).unwrap_or(u32::MAX))

@@ -37,7 +37,6 @@ pub struct Workspace {
     arm: Option<ArmHull>,
     /// Lowest corner of the box for the centre of the tip's cap [m].
     low: [f64; 3],
-    /// Highest corner.
     high: [f64; 3],
     /// Height that every ball of the arm stays above; minus infinity without a table.
     floor: f64,
@@ -66,7 +65,6 @@ impl Outside {
 impl Workspace {
     /// The space of a cell, whose arm is `model`: tool and links 2 mm above its table, the tip within 1.2 m of the base along
     /// each axis.
-    #[must_use]
     pub fn of(cell: &Cell, model: &ArmModel) -> Self {
         let arm = ArmHull::of(cell, model);
         let levers = arm.as_ref().map_or([[0.0; MAX_JOINTS]; 2], |arm| [arm.levers(), arm.height_levers()]);
@@ -80,27 +78,23 @@ impl Workspace {
     }
 
     /// Distance to the nearest bound at joint positions `q` [m]; negative outside.
-    #[must_use]
     pub fn room(&self, q: &Joints) -> f64 {
         let [above, within] = self.left(q, &Outside { by: [0.0; BOUNDS], forgiven: 0.0 });
         smaller(above, within)
     }
 
     /// How far outside an arm is that is commanded to be at `q`.
-    #[must_use]
     pub fn outside(&self, q: &Joints) -> Outside {
         Outside { by: self.distances(q).map(|distance| distance.min(0.0)), forgiven: 0.0 }
     }
 
     /// How far outside an arm is that was measured at `q`.
-    #[must_use]
     pub fn outside_measured(&self, q: &Joints) -> Outside {
         Outside { forgiven: FORGIVEN, ..self.outside(q) }
     }
 
     /// The same of an arm that came to rest at `q` and was `before` where it rested last: what it came nearer is kept, and
     /// no motion that was admitted makes it more. Only an arm that lost set points is deeper than it was let.
-    #[must_use]
     pub fn outside_after(&self, q: &Joints, before: &Outside) -> Outside {
         let mut outside = *before;
         let bounds = outside.by.iter_mut().zip(before.let_to()).zip(self.distances(q));
@@ -111,7 +105,6 @@ impl Workspace {
     }
 
     /// `true` when the whole way to rest from `trace` is inside, or no deeper outside than `outside` lets it.
-    #[must_use]
     pub fn keeps(&self, trace: &Trace, limits: &Limits, period_s: f64, outside: &Outside) -> bool {
         if self.arm.is_none() {
             return true;

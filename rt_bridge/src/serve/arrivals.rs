@@ -23,7 +23,6 @@ const QUIET: Duration = Duration::from_secs(5);
 const ASK_EVERY: Duration = Duration::from_secs(2);
 const UNANSWERED: u32 = 3;
 
-/// A connection.
 #[derive(Debug)]
 pub(super) struct Arrival {
     pub(super) tcp: TcpStream,

@@ -22,7 +22,6 @@ const BRAKE: f64 = 100.0;
 /// Slower than this a joint stands [rad/s].
 const AT_REST: f64 = 1e-3;
 
-/// The body.
 pub(super) struct Body {
     /// The cell with all its objects.
     scene: SimScene,

@@ -91,7 +91,6 @@ fn take(rest: &mut &[u8], count: usize) -> Vec<u8> {
 }
 
 /// Well-formed inputs for [`arm`]: every request alone, and a motion in each of its modes.
-#[must_use]
 pub fn arm_seeds() -> Vec<Vec<u8>> {
     let over_tcp = |message: &[u8]| -> Vec<u8> {
         message.chunks(63).flat_map(|part| [&[4 * part.len() as u8][..], part].concat()).collect()
@@ -139,7 +138,6 @@ pub fn hand(input: &[u8]) {
 }
 
 /// Well-formed inputs for [`hand`]: every request.
-#[must_use]
 pub fn hand_seeds() -> Vec<Vec<u8>> {
     let layout = franka::wire::HeaderLayout::Gripper;
     let asked = |number: u32, length: usize| {

@@ -90,7 +90,6 @@ pub enum ServeError {
         address.ip()
     )]
     PortTaken {
-        /// Where.
         address: SocketAddr,
         /// The argument that chooses it.
         flag: &'static str,
@@ -98,7 +97,6 @@ pub enum ServeError {
     /// The system does not let us listen there.
     #[error("cannot listen on {address} ({source}); give `--bind` an address of this machine, for example 127.0.0.1")]
     Bind {
-        /// Where.
         address: SocketAddr,
         /// The system's reason.
         source: std::io::Error,

@@ -19,7 +19,6 @@ const LAG: f64 = 0.016;
 /// Where the Jacobian stretches less than this, a wrench cannot be told from joint torques and is reported as none.
 const NEAR_SINGULAR: f64 = 0.03;
 
-/// The estimate.
 #[derive(Debug, Clone)]
 pub(super) struct Observer {
     last: JointState,
@@ -96,7 +95,6 @@ impl Touched {
         [self.joint_collision.contains(&true), self.cartesian_collision.contains(&true)]
     }
 
-    /// Error recovery.
     pub(super) fn forget_collisions(&mut self) {
         (self.joint_collision, self.cartesian_collision) = ([false; 7], [false; 6]);
     }

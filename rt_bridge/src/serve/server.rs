@@ -139,7 +139,6 @@ impl Server {
     }
 
     /// Where the hand listens, where there is one.
-    #[must_use]
     pub fn hand_address(&self) -> Option<SocketAddr> {
         self.hand.as_ref().map(HandService::address)
     }

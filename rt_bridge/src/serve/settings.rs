@@ -48,7 +48,6 @@ pub(super) struct Settings {
     pub(super) cartesian_stiffness: [f64; 6],
     /// While something is commanded to accelerate.
     pub(super) accelerating: Thresholds,
-    /// Otherwise.
     pub(super) nominal: Thresholds,
     /// What is mounted, as the laboratory has told the robot on its web page.
     pub(super) end_effector: MassProperties,

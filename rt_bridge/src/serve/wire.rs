@@ -26,7 +26,6 @@ pub(super) enum Controller {
     JointImpedance,
     /// The robot, at the end effector.
     CartesianImpedance,
-    /// The client.
     External,
 }
 

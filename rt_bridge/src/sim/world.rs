@@ -61,7 +61,6 @@ pub enum WorldError {
     /// Cell or parameters.
     #[error(transparent)]
     Cell(#[from] SimError),
-    /// Its thread.
     #[error(transparent)]
     Thread(#[from] ThreadError),
 }

@@ -87,7 +87,6 @@ struct Seen {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "made once a frame and read in place")]
 pub enum Sight {
-    /// The object.
     Tracked(Estimate),
     /// Not the object, and why.
     Lost(Reason),
@@ -122,7 +121,6 @@ pub enum TrackerError {
     /// The object's mesh.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
-    /// The arm.
     #[error(transparent)]
     Arm(#[from] ModelError),
     /// Nothing to track.
@@ -134,10 +132,8 @@ pub enum TrackerError {
          a tracker of your own on /object/poses"
     )]
     Articulated(String),
-    /// Shared memory.
     #[error(transparent)]
     Transport(#[from] shared_mem::transport::TransportError),
-    /// Its thread.
     #[error(transparent)]
     Thread(#[from] crate::starting::ThreadError),
 }
@@ -172,25 +168,21 @@ impl Tracker {
     }
 
     /// How the camera projects, once that is known.
-    #[must_use]
     pub fn view(&self) -> Option<&View> {
         self.view.as_ref()
     }
 
     /// The object, as the tracker knows it.
-    #[must_use]
     pub fn model(&self) -> &Model {
         &self.model
     }
 
     /// Turns about the vertical after which the object, standing as it does in `pose`, looks the same; the first 0 [rad].
-    #[must_use]
     pub fn equivalent_yaws(&self, pose: &Pose<Base, Object>) -> Vec<f64> {
         self.model.equivalent_yaws(&pose.isometry())
     }
 
     /// How far off the camera measures distances, as a share of them; positive: too long. 0 while no table was seen.
-    #[must_use]
     pub fn too_long(&self) -> f32 {
         self.table.map_or(0.0, |table| table.too_long())
     }

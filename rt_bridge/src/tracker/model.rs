@@ -42,7 +42,6 @@ pub(super) struct Stance {
 
 impl Model {
     /// Of a box or a mesh. A mesh is taken to stand with one of its own axes upright.
-    #[must_use]
     pub fn new(shape: &ObjectShape) -> Self {
         let (points, triangles) = shape.triangles();
         let symmetries: Vec<_> = turns_of_a_cube().filter(|turn| looks_the_same(shape, turn)).collect();
@@ -61,7 +60,6 @@ impl Model {
     }
 
     /// The turns about the vertical that leave the object as it is in `pose` looking the same, the first 0 [rad].
-    #[must_use]
     pub fn equivalent_yaws(&self, pose: &Isometry3<f64>) -> Vec<f64> {
         let mut yaws: Vec<f64> = self
             .symmetries
@@ -78,7 +76,6 @@ impl Model {
     }
 
     /// Of all poses that look the same as `pose`, the one turned least from `reference`.
-    #[must_use]
     pub fn nearest(&self, pose: &Isometry3<f64>, reference: &UnitQuaternion<f64>) -> Isometry3<f64> {
         let turned = self.symmetries.iter().map(|s| pose.rotation * s);
         let rotation = turned.min_by(|a, b| a.angle_to(reference).total_cmp(&b.angle_to(reference)));

@@ -27,7 +27,6 @@ pub(super) struct Patch {
     pub(super) seen: Vec<f32>,
     /// Inverse depth of the robot's outline, a little widened [1/m]; 0: not here.
     pub(super) arm: Vec<f32>,
-    /// Colours measured.
     pub(super) bins: Vec<Bin>,
     object: Raster,
 }

@@ -24,7 +24,6 @@ const OUTSIDE: u32 = u32::MAX;
 
 impl View {
     /// From what `/camera/info` says; `None` where it describes no camera.
-    #[must_use]
     pub fn new(info: &CameraInfo) -> Option<Self> {
         let [fx, fy, cx, cy] = info.intrinsics.map(|v| v as f32);
         let pose = shared_mem::frames::Pose::<shared_mem::frames::Base, shared_mem::frames::Camera>::from_parts(
@@ -48,7 +47,6 @@ impl View {
     }
 
     /// Where a point of the base frame lands in a picture without distortion [pixel].
-    #[must_use]
     pub fn project(&self, point: &[f64; 3]) -> [f64; 2] {
         self.pixel(&self.base_from_camera.inverse_transform_point(&nalgebra::Point3::from(*point)).coords)
     }
@@ -104,7 +102,6 @@ struct Rows<'a> {
 
 impl<'a> Frame<'a> {
     /// From the pictures and their headers; `None` where they are no depth and colour picture of `view`'s size.
-    #[must_use]
     pub fn new(view: &View, depth: (&ImageHeader, &'a [u8]), color: Option<(&ImageHeader, &'a [u8])>) -> Option<Self> {
         let rows = |(header, bytes): (&ImageHeader, &'a [u8]), encoding, pixel: usize| {
             let stride = header.stride as usize;

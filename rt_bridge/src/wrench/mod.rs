@@ -23,7 +23,6 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::mpsc::Sender;
 
-/// Which sensor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum WrenchChoice {
     /// The simulated cell's.
@@ -32,7 +31,6 @@ pub enum WrenchChoice {
     Can(String),
     /// What a recording holds of one.
     Replay,
-    /// None.
     Off,
 }
 

@@ -41,17 +41,10 @@ pub enum Part {
     Matrix {
         /// First of their columns: 0, 2 or 4.
         column: usize,
-        /// The numbers.
         values: [f32; 2],
     },
     /// Counts in one unit.
-    Counts {
-        /// Of force.
-        force: u32,
-        /// Of torque.
-        torque: u32,
-    },
-    /// Which units.
+    Counts { force: u32, torque: u32 },
     Units {
         /// Code of the force's.
         force: u8,
@@ -62,21 +55,16 @@ pub enum Part {
 
 impl Frame {
     /// A frame; `None` for an identifier of more than eleven bits or more than eight bytes.
-    #[must_use]
     pub fn new(id: u16, bytes: &[u8]) -> Option<Self> {
         let mut data = [0; 8];
         data.get_mut(..bytes.len())?.copy_from_slice(bytes);
         (id < 1 << 11).then_some(Self { id, length: bytes.len() as u8, data })
     }
 
-    /// Its identifier.
-    #[must_use]
     pub fn id(&self) -> u16 {
         self.id
     }
 
-    /// Its bytes.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.data[..usize::from(self.length)]
     }
@@ -84,7 +72,6 @@ impl Frame {
 
 impl Ask {
     /// The frame that asks the sensor of the seven-bit identifier `base`.
-    #[must_use]
     pub fn frame(self, base: u8) -> Frame {
         let (code, row) = match self {
             Self::Gauges => (0, None),
@@ -98,7 +85,6 @@ impl Ask {
     }
 
     /// Frames that answer it.
-    #[must_use]
     pub fn answers(self) -> usize {
         match self {
             Self::Gauges => 2,
@@ -110,7 +96,6 @@ impl Ask {
 
 impl Part {
     /// What a frame of the sensor `base` says; `None` for frames of others, questions and what has the wrong length.
-    #[must_use]
     pub fn of(frame: &Frame, base: u8) -> Option<Self> {
         if frame.id >> 4 != u16::from(base & 0x7F) {
             return None;
@@ -133,7 +118,6 @@ impl Part {
     }
 
     /// The frame by which the sensor `base` says this: for sensors that are played.
-    #[must_use]
     pub fn frame(&self, base: u8) -> Frame {
         let shorts = |values: &[i16; 3]| values.map(i16::to_be_bytes).concat();
         let (code, bytes) = match self {
@@ -158,7 +142,6 @@ pub struct Calibration {
 impl Calibration {
     /// From what the sensor tells about itself; `None` for units that are not known, no counts, or a matrix that holds
     /// something that is no number.
-    #[must_use]
     pub fn new(matrix: [[f32; 6]; 6], counts: [u32; 2], units: [u8; 2]) -> Option<Self> {
         let finite = matrix.iter().flatten().all(|value| value.is_finite());
         if !finite || counts.contains(&0) {
@@ -171,7 +154,6 @@ impl Calibration {
     }
 
     /// Force [N] and torque [N m] of a sample.
-    #[must_use]
     pub fn wrench(&self, gauges: &[i16; 6]) -> [[f64; 3]; 2] {
         let value = |row: usize| {
             let counts: f64 = self.matrix[row].iter().zip(gauges).map(|(m, gauge)| m * f64::from(*gauge)).sum();
@@ -208,7 +190,6 @@ fn newton_metres(code: u8) -> Option<f64> {
 }
 
 /// What a sample's status complains about, the most serious first, with the remedy; `None` where all is well.
-#[must_use]
 pub fn status_in_words(status: u16) -> Option<&'static str> {
     const WORDS: [(u16, &str); 12] = [
         (7, "cannot read its memory; have it repaired"),

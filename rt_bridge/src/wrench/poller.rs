@@ -68,7 +68,6 @@ struct Answer {
 
 impl<B: Bus> Poller<B> {
     /// The sensor of cell.toml's `[wrench]` on `bus`.
-    #[must_use]
     pub fn new(bus: B, described: WrenchSensor) -> Self {
         Self {
             bus,

@@ -23,7 +23,6 @@ pub(crate) mod at {
     pub(crate) const TORQUE_FINISHED: usize = 370;
 }
 
-/// One reply.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Reply {
     pub(crate) number: u32,

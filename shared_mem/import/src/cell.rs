@@ -43,7 +43,6 @@ damping_range = [0.0, 200.0]
 };
 
 /// What is usual for an arm with joints of these names: a Franka's joint impedance, or servos.
-#[must_use]
 pub fn usual_controller(joints: &[String]) -> UsualController {
     if is_franka(joints) { FRANKA_CONTROLLER } else { SERVO_CONTROLLER }
 }
@@ -85,7 +84,6 @@ pub(crate) fn proposed(log: &Log, joints: &[String], base: Option<&str>) -> Stri
 
 /// Rotors that stand in for the inertia of joints that move none in an arm's description.
 pub struct Rotors {
-    /// Those joints.
     pub without_inertia: Vec<String>,
     /// Of every joint [kg m²].
     pub rotor_inertia: Vec<f64>,
@@ -117,7 +115,6 @@ fn controller(joints: &[String]) -> String {
 }
 
 /// Whether these are the seven joints of a Franka, in their order.
-#[must_use]
 pub fn is_franka(joints: &[String]) -> bool {
     let numbered = |(i, name): (usize, &String)| {
         let name = name.to_ascii_lowercase();

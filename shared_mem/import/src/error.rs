@@ -33,7 +33,6 @@ pub enum ImportError {
     /// An import.toml with open lines is there from an import before.
     #[error("{} is there from an import before: fill in its open lines, then: {command}; or have them asked anew with --force", file.display())]
     Asked {
-        /// The import.toml.
         file: PathBuf,
         /// What imports with it.
         command: String,
@@ -57,12 +56,8 @@ pub enum ImportError {
         /// What was spent.
         source: BudgetError,
     },
-    /// Ctrl-C.
     #[error("{}: interrupted while it was read; start again", path.display())]
-    Interrupted {
-        /// The file.
-        path: PathBuf,
-    },
+    Interrupted { path: PathBuf },
 }
 
 impl ImportError {

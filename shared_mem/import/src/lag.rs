@@ -73,7 +73,6 @@ const RIDGE: f64 = 2.0;
 const APART: f64 = 2e-3;
 
 /// The lag of a motion, joint by joint; `None` of too few rows, or where one of the two stands still.
-#[must_use]
 pub fn between(told: Motion<'_>, done: Motion<'_>) -> Option<Lag> {
     Some(clearest(told, done)?.1)
 }
@@ -96,14 +95,12 @@ fn clearest(told: Motion<'_>, done: Motion<'_>) -> Option<(Grid, Lag)> {
 }
 
 /// The lag of the speeds of all joints together, about their means: neither order nor signs of the joints change it.
-#[must_use]
 pub fn of_speeds(told: Motion<'_>, done: Motion<'_>) -> Option<Lag> {
     let grid = Grid::of(told, done, WINDOWS[0])?;
     grid.lag(&grid.told.speeds(), &grid.done.speeds())
 }
 
 /// Joints in groups of one lag each, the earliest first; a single group, or none, where no two joints differ surely.
-#[must_use]
 pub fn groups(told: Motion<'_>, done: Motion<'_>) -> Vec<Group> {
     let Some((grid, _)) = clearest(told, done) else { return Vec::new() };
     let own = |joint: usize| {
@@ -128,7 +125,6 @@ pub fn groups(told: Motion<'_>, done: Motion<'_>) -> Vec<Group> {
 }
 
 /// Groups in a line.
-#[must_use]
 pub fn in_words(groups: &[Group]) -> String {
     let one = |group: &Group| {
         let joints: Vec<String> = group.joints.iter().map(|joint| (joint + 1).to_string()).collect();
@@ -139,7 +135,6 @@ pub fn in_words(groups: &[Group]) -> String {
 }
 
 /// A lag and both ends of its interval [s] in milliseconds, with the digits that tell the ends apart.
-#[must_use]
 pub fn milliseconds(numbers: [f64; 3]) -> [String; 3] {
     let with = |digits: usize| {
         // Without the sign of a 0.
@@ -195,7 +190,6 @@ struct Sums {
     told: f64,
     both: f64,
     done: f64,
-    /// Numbers compared.
     count: f64,
 }
 

@@ -41,7 +41,6 @@ pub(crate) struct Table {
 /// Numbers under a name: `tau_J[3]`, `position[fr3_joint4]`, `time`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Column {
-    /// The name.
     pub(crate) name: String,
     /// One number a row; NaN where a row has none.
     pub(crate) values: Vec<f64>,
@@ -75,7 +74,6 @@ pub(crate) struct Facts {
 pub struct LeftOut {
     /// Topic, file or column.
     pub what: String,
-    /// Why.
     pub why: &'static str,
     /// Messages, files or rows.
     pub count: u64,

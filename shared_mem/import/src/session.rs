@@ -68,16 +68,13 @@ pub struct Imported {
 /// What came of it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// A session.
     Done {
-        /// Its clips.
         clips: Vec<Imported>,
         /// Why the columns were taken as they were; empty where the mapping was given.
         notes: Vec<Note>,
     },
     /// An import.toml with lines that are to be filled in, and no session.
     Open {
-        /// That file.
         file: PathBuf,
         /// Its lines that are open, and why the others are as they are.
         notes: Vec<Note>,

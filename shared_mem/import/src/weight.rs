@@ -94,7 +94,6 @@ const AGREE: f64 = 2.0;
 
 impl Weight {
     /// Fits the pull; `None` of fewer moments than tell anything, of torques that are all 0, or where a number is none.
-    #[must_use]
     pub fn of(moments: &[Moment]) -> Option<Self> {
         let dof = moments.first()?.tau.len();
         let whole = |m: &Moment| {
@@ -112,13 +111,11 @@ impl Weight {
     }
 
     /// Size of the pull [m/s²].
-    #[must_use]
     pub fn size(&self) -> f64 {
         dot(self.pull, self.pull).sqrt()
     }
 
     /// Share of the model's weight, with half its 95 % interval; `falls`: free fall in the model's base frame [m/s²].
-    #[must_use]
     pub fn share(&self, falls: [f64; 3]) -> [f64; 2] {
         let square = dot(falls, falls);
         let sigma = dot(falls, product(&self.covariance, falls)).max(0.0).sqrt();
@@ -126,7 +123,6 @@ impl Weight {
     }
 
     /// What it means; `falls`: free fall in the model's base frame [m/s²].
-    #[must_use]
     pub fn finding(&self, falls: [f64; 3]) -> Finding {
         let g = dot(falls, falls).sqrt();
         let [share, half] = self.share(falls);
@@ -178,7 +174,6 @@ impl Weight {
 
     /// Joints, from 0, whose torque is the other way round beside others that hold the model, each with how many times the model's
     /// it is.
-    #[must_use]
     pub fn turned(&self, falls: [f64; 3]) -> Vec<(usize, f64)> {
         let factors = (0..self.joints.len()).filter_map(|joint| Some((joint, self.factor(joint, falls)?)));
         let (as_modelled, odd): (Vec<_>, Vec<_>) = factors.partition(|(_, [factor, _])| ALL.contains(factor));
@@ -239,7 +234,6 @@ impl Weight {
     }
 
     /// What else it may be where the weight pulls against the model's and the motion does not tell; empty where it does.
-    #[must_use]
     pub fn doubt(&self, falls: [f64; 3]) -> &'static str {
         let [pace, sigma] = self.pace;
         let against = dot(self.pull, falls) < -ANOTHER_WAY.cos() * self.size() * dot(falls, falls).sqrt();
@@ -251,7 +245,6 @@ impl Weight {
     }
 
     /// The pull in words: its axis of the base where it is near one, and its size.
-    #[must_use]
     pub fn in_words(&self) -> String {
         let size = self.size();
         let axis = (0..3).max_by(|a, b| self.pull[*a].abs().total_cmp(&self.pull[*b].abs())).unwrap_or(2);
@@ -275,7 +268,6 @@ const UNITS: [(f64, &str); 6] =
 const NEAR_UNIT: f64 = 0.05;
 
 /// What torques that are so many times the model's may be.
-#[must_use]
 pub fn meaning(factor: f64) -> String {
     let near = |unit: &&(f64, &str)| (factor.abs() / unit.0 - 1.0).abs() < NEAR_UNIT;
     let turned = if factor < 0.0 { "counted the other way round" } else { "" };

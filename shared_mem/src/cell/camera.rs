@@ -114,7 +114,6 @@ impl Camera {
 
     /// Intrinsics in force: those given, else a D455 colour camera's (fx 912.9 px at 1280 columns, measured on one
     /// device) scaled to this picture with square pixels.
-    #[must_use]
     pub fn pinhole(&self) -> Intrinsics {
         self.intrinsics.unwrap_or_else(|| {
             let (width, height) = (f64::from(self.width), f64::from(self.height));
@@ -125,7 +124,6 @@ impl Camera {
     }
 
     /// Pose of the optical frame in the base frame; `None` when the quaternion has no direction.
-    #[must_use]
     pub fn base_from_camera(&self) -> Option<Pose<Base, CameraFrame>> {
         Pose::from_parts(self.pose.position, self.pose.orientation)
     }

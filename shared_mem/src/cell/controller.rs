@@ -97,7 +97,6 @@ impl ControllerKind {
     }
 
     /// Its name in cell.toml; `None` for what is no law of a robot.
-    #[must_use]
     pub fn name(self) -> Option<&'static str> {
         match self {
             Self::JointImpedance => Some("joint_impedance"),

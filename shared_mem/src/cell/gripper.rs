@@ -34,13 +34,11 @@ pub enum GripperModel {
 
 impl Gripper {
     /// A gripper as its maker ships it.
-    #[must_use]
     pub fn new(model: GripperModel) -> Self {
         Self { model, stroke: None, counts: None }
     }
 
     /// Widest opening in force [m].
-    #[must_use]
     pub fn widest(&self) -> f64 {
         self.stroke.unwrap_or(match self.model {
             GripperModel::Robotiq2F85 => 0.085,
@@ -50,7 +48,6 @@ impl Gripper {
     }
 
     /// Position counts in force, at the widest and closed.
-    #[must_use]
     pub fn counts(&self) -> [u8; 2] {
         self.counts.unwrap_or([3, 230])
     }

@@ -160,7 +160,6 @@ impl Cell {
 
     /// Name of the base frame in force: that of `[robot]`, else the built-in model's first link, else `base`. Recordings, bags and
     /// viewers name it alike.
-    #[must_use]
     pub fn base_frame(&self) -> &str {
         let robot = self.robot.as_ref();
         let built_in = robot.and_then(|robot| robot.model.as_deref()).map(|_| "fr3_link0");
@@ -168,7 +167,6 @@ impl Cell {
     }
 
     /// The same cell with paths that hold from any folder, the same however its file was spelt: what goes into another file.
-    #[must_use]
     pub fn at_home_anywhere(&self) -> Self {
         let mut cell = self.clone();
         let anchor = |path: &mut PathBuf| *path = place::from_anywhere(&self.folder.join(&*path));
@@ -186,13 +184,11 @@ impl Cell {
     ///
     /// # Panics
     /// Never: every field has a TOML form.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string_pretty(self).expect("numbers, strings, arrays and tables have a TOML form")
     }
 
     /// Number of joints, as far as this file alone tells (a URDF knows its own).
-    #[must_use]
     pub fn dof_hint(&self) -> Option<usize> {
         let robot = self.robot.as_ref()?;
         if robot.model.is_some() {

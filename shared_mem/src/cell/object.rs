@@ -195,7 +195,6 @@ impl Object {
     }
 
     /// Mass to simulate with when nothing was identified: the weighed one, else the middle of its range, else a homogeneous 500 kg/m³ [kg].
-    #[must_use]
     pub fn nominal_mass(&self) -> f64 {
         self.mass
             .or_else(|| self.mass_range.map(middle))
@@ -204,19 +203,16 @@ impl Object {
     }
 
     /// Friction on the table when nothing was identified: the middle of its range, else 0.3.
-    #[must_use]
     pub fn nominal_friction(&self) -> f64 {
         self.friction_range.map_or(0.3, middle)
     }
 
     /// Friction against the tool when nothing was identified: the middle of its range, else 0.2.
-    #[must_use]
     pub fn nominal_tip_friction(&self) -> f64 {
         self.tip_friction_range.map_or(0.2, middle)
     }
 
     /// Restitution against the table when nothing was identified: the middle of its range, else 0.
-    #[must_use]
     pub fn nominal_restitution(&self) -> f64 {
         self.restitution_range.map_or(0.0, middle)
     }

@@ -30,7 +30,6 @@ impl Named for Object {
 
 impl Cell {
     /// The object that a command is about: the first, unless [`Self::about`] said another; `None` without any.
-    #[must_use]
     pub fn object(&self) -> Option<&Object> {
         self.objects.get(self.in_question)
     }
@@ -41,13 +40,11 @@ impl Cell {
     }
 
     /// Its name; `None` without one.
-    #[must_use]
     pub fn object_name(&self) -> Option<&str> {
         self.object()?.name.as_deref()
     }
 
     /// Its name where there are several, so that an answer has to say which one it is about.
-    #[must_use]
     pub fn one_of_several(&self) -> Option<&str> {
         self.object_name().filter(|_| self.objects.len() > 1)
     }
@@ -59,7 +56,6 @@ impl Cell {
 
     /// Where it starts in the simulated cell: x, y of its geometric centre in the base frame [m], and its rotation about z [rad]. What its
     /// own block leaves out stands under `[simulation]`.
-    #[must_use]
     pub fn object_start(&self) -> ([f64; 2], f64) {
         let (own, simulation) = (self.object(), &self.simulation);
         let place = own.and_then(|object| object.start).unwrap_or(simulation.object_position);

@@ -19,7 +19,6 @@ pub enum Ranges {
 
 impl Ranges {
     /// That of a joint, from 0; `None` beyond the last one.
-    #[must_use]
     pub fn of(&self, joint: usize) -> Option<Range> {
         match self {
             Self::All(range) => Some(*range),

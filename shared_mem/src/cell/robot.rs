@@ -82,7 +82,6 @@ impl Topics {
 
 impl Robot {
     /// Whether nothing is known of the arm but the names of its joints.
-    #[must_use]
     pub fn joints_only(&self) -> bool {
         self.urdf.is_none() && !self.joints.is_empty()
     }

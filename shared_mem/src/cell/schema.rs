@@ -7,7 +7,6 @@ use serde_json::Value;
 impl Cell {
     /// JSON Schema (draft 2020-12) of a cell.toml: every key with its meaning, unit and default, no others allowed. What hangs
     /// together between keys, such as one gain a joint, is checked in reading alone.
-    #[must_use]
     pub fn schema() -> Value {
         let mut schema = schemars::schema_for!(Self).to_value();
         if let Some(root) = schema.as_object_mut() {

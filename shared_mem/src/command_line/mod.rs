@@ -63,7 +63,6 @@ const MODIFIED: &str = "-modified";
 static FINGERPRINT: OnceLock<String> = OnceLock::new();
 
 /// What tells this build of the program from others: what `--version` says. Empty in a process that called no [`parse`].
-#[must_use]
 pub fn fingerprint() -> &'static str {
     FINGERPRINT.get().map_or("", String::as_str)
 }
@@ -90,7 +89,6 @@ const COMPLETIONS: &str = "completions";
 const MANPAGES: &str = "manpages";
 
 /// The whole command line of a program.
-#[must_use]
 pub fn command<A: Parser>(build: &Build) -> Command {
     let command = A::command().version(build.line());
     let name = command.get_name().to_owned();

@@ -39,7 +39,6 @@ impl<'a> Said<'a> {
 
 impl Decimal {
     /// The number that a cell holds; `None` where it holds none.
-    #[must_use]
     pub fn number(self, cell: &str) -> Option<f64> {
         if self == Self::Point
             && let Ok(number) = cell.parse()

@@ -146,7 +146,6 @@ fn latin(byte: u8) -> char {
 }
 
 /// Whether an XML document says of itself that it is written so.
-#[must_use]
 pub(super) fn declares_latin(text: &str) -> bool {
     let Some((declaration, _)) = text.trim_start().strip_prefix("<?xml").and_then(|rest| rest.split_once("?>")) else {
         return false;

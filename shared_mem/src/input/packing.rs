@@ -27,7 +27,6 @@ impl Packing {
     pub const TOLD_BY: usize = 10;
 
     /// How something is packed that begins with these bytes; `None` where it is not.
-    #[must_use]
     pub fn of(start: &[u8]) -> Option<Self> {
         match start {
             [0x1f, 0x8b, 8, ..] => Some(Self::Gzip),
@@ -43,7 +42,6 @@ impl Packing {
     }
 
     /// What it is called.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Gzip => "gzip",
@@ -57,7 +55,6 @@ impl Packing {
     }
 
     /// What unpacks a file of it.
-    #[must_use]
     pub const fn remedy(self) -> &'static str {
         match self {
             Self::Gzip => "unpack it with `gunzip`",

@@ -65,7 +65,6 @@ impl Calibration {
     }
 
     /// What is to be said about a lens whose numbers have no name.
-    #[must_use]
     pub fn remark(&self) -> Option<String> {
         self.is_unnamed.then(|| {
             "four numbers of distortion stand without `distortion_model`: they were taken as k1, k2, p1, p2, as OpenCV has them; \

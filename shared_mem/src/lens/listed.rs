@@ -39,7 +39,6 @@ const OWN: [&str; 8] = ["fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx"
 
 impl Numbers {
     /// Whether a key is read.
-    #[must_use]
     pub fn is_read(key: &str) -> bool {
         let of_lens = [&Keys::MODELS[..], &Keys::FLAGS, &Keys::NUMBERS].iter().any(|keys| keys.contains(&key));
         of_lens || OWN.contains(&key)
@@ -62,7 +61,6 @@ impl Numbers {
     }
 
     /// Whether something is said about a focal length.
-    #[must_use]
     pub fn has_focal(&self) -> bool {
         [self.fl_x, self.fl_y, self.camera_angle_x, self.camera_angle_y].iter().any(Option::is_some)
     }
@@ -133,7 +131,6 @@ impl Numbers {
     }
 
     /// Whether something is said about the lens.
-    #[must_use]
     pub fn has_lens(&self) -> bool {
         self.lens != Keys::default()
     }

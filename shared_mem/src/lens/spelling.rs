@@ -38,7 +38,6 @@ const COMMON: [&str; 8] = ["k", "d", "model", "model_type", "cx", "cy", "p1", "p
 const DEEPEST: usize = 4;
 
 /// Whether a key names something of a lens, by its words: a fisheye, coefficients, intrinsics, a mirror's `xi`, a focal length.
-#[must_use]
 pub(super) fn speaks_of_lens(key: &str) -> bool {
     let mut words = String::new();
     let mut was_small = false;

@@ -26,7 +26,6 @@ pub struct Event {
 
 impl Event {
     /// An event of now. Text beyond [`TEXT_LENGTH`] bytes is cut.
-    #[must_use]
     pub fn new(level: EventLevel, source: EventSource, text: &str) -> Self {
         let mut end = text.len().min(TEXT_LENGTH);
         while !text.is_char_boundary(end) {
@@ -45,7 +44,6 @@ impl Event {
     }
 
     /// The text.
-    #[must_use]
     pub fn text(&self) -> &str {
         let end = (self.length as usize).min(TEXT_LENGTH);
         std::str::from_utf8(&self.text[..end]).unwrap_or("")

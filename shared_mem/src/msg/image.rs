@@ -92,7 +92,6 @@ impl PixelEncoding {
     const ALL: [Self; 2] = [Self::Rgb8, Self::Depth16];
 
     /// Bytes of one pixel.
-    #[must_use]
     pub fn bytes_per_pixel(self) -> u32 {
         match self {
             Self::Rgb8 => 3,
@@ -101,7 +100,6 @@ impl PixelEncoding {
     }
 
     /// What ROS and Foxglove call it (`sensor_msgs/image_encodings.hpp`).
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Rgb8 => "rgb8",
@@ -110,7 +108,6 @@ impl PixelEncoding {
     }
 
     /// The encoding of a [`Self::name`]; `None` for any other.
-    #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|encoding| encoding.name() == name)
     }

@@ -26,7 +26,6 @@ pub const MAX_JOINTS: usize = 8;
 pub type Joints = [f64; MAX_JOINTS];
 
 /// Copies a slice into a [`Joints`] array; what does not fit is left out, what is missing is 0.
-#[must_use]
 pub fn joints_from(values: &[f64]) -> Joints {
     let mut out = [0.0; MAX_JOINTS];
     for (o, v) in out.iter_mut().zip(values) {

@@ -41,7 +41,6 @@ impl Default for ObjectPose {
 
 impl ObjectPose {
     /// The pose with its frames named; `None` when the numbers are no pose.
-    #[must_use]
     pub fn pose(&self) -> Option<Pose<Base, Object>> {
         Pose::from_parts(self.position, self.wxyz)
     }
@@ -62,7 +61,6 @@ plain!(ObjectPose);
 pub const NAME_LENGTH: usize = 64;
 
 /// Whether a text can name an object: up to [`NAME_LENGTH`] letters, digits and `_`, so that it can stand in a topic.
-#[must_use]
 pub fn is_object_name(text: &str) -> bool {
     (1..=NAME_LENGTH).contains(&text.len()) && text.bytes().all(|c| c.is_ascii_alphanumeric() || c == b'_')
 }
@@ -85,7 +83,6 @@ impl std::fmt::Debug for ObjectName {
 
 impl ObjectName {
     /// The name; `None` for a text that is none.
-    #[must_use]
     pub fn new(text: &str) -> Option<Self> {
         is_object_name(text).then(|| {
             let mut bytes = [0; NAME_LENGTH];
@@ -95,14 +92,12 @@ impl ObjectName {
     }
 
     /// Its text; empty where there is none.
-    #[must_use]
     pub fn text(&self) -> &str {
         let end = self.0.iter().position(|byte| *byte == 0).unwrap_or(NAME_LENGTH);
         std::str::from_utf8(&self.0[..end]).unwrap_or("")
     }
 
     /// Whether there is none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0[0] == 0
     }
@@ -144,14 +139,12 @@ pub struct NamedPose {
 
 impl NamedPose {
     /// The pose of the object of this name.
-    #[must_use]
     pub fn new(name: ObjectName, pose: &ObjectPose) -> Self {
         let ObjectPose { stamp_ns, device_ns, sequence, position, wxyz, covariance } = *pose;
         Self { stamp_ns, device_ns, sequence, position, wxyz, covariance, name }
     }
 
     /// The same without the name.
-    #[must_use]
     pub fn unnamed(&self) -> ObjectPose {
         let Self { stamp_ns, device_ns, sequence, position, wxyz, covariance, .. } = *self;
         ObjectPose { stamp_ns, device_ns, sequence, position, wxyz, covariance }

@@ -25,7 +25,6 @@ impl std::fmt::Debug for ArmOrigin {
 
 impl ArmOrigin {
     /// The arm of this text, as `--arm` takes it; a recording's name is cut where it is too long. Empty for a text that is no arm.
-    #[must_use]
     pub fn new(arm: &str) -> Self {
         let text = match arm.parse() {
             Ok(Origin::Replay { clip }) => format!("replay://{clip}"),
@@ -42,14 +41,12 @@ impl ArmOrigin {
     }
 
     /// Its text; empty where nobody says.
-    #[must_use]
     pub fn text(&self) -> &str {
         let end = self.0.iter().position(|byte| *byte == 0).unwrap_or(LENGTH);
         std::str::from_utf8(&self.0[..end]).unwrap_or("")
     }
 
     /// The origin; `None` where nobody says.
-    #[must_use]
     pub fn origin(&self) -> Option<Origin> {
         self.text().parse().ok()
     }

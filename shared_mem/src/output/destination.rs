@@ -81,7 +81,6 @@ impl Destination {
     }
 
     /// The name that was asked for.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }

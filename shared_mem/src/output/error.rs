@@ -61,19 +61,16 @@ impl OutputError {
     }
 
     /// What `error` says of the output `path`: the [`OutputError`] in it, if a writer of this module raised it.
-    #[must_use]
     pub fn of(path: &Path, error: io::Error) -> Self {
         Self::inside(&error).unwrap_or_else(|| Self::new(path, &error, 0, 0))
     }
 
     /// The [`OutputError`] that a writer of this module raised, out of what the caller of that writer got.
-    #[must_use]
     pub fn inside(error: &io::Error) -> Option<Self> {
         error.get_ref().and_then(|inner| inner.downcast_ref::<Self>()).cloned()
     }
 
     /// The output.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }

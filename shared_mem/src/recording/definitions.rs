@@ -14,7 +14,6 @@ const STAMPED: &str = "MSG: geometry_msgs/TransformStamped\nstd_msgs/Header head
 const REGION: &str = "MSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n";
 
 /// Text of a ROS 2 type's definition (`sensor_msgs/msg/JointState`); empty for types that are never written.
-#[must_use]
 pub fn definition(type_name: &str) -> String {
     let (own, used): (&str, &[&str]) = match type_name {
         "sensor_msgs/msg/JointState" => (

@@ -22,7 +22,6 @@ pub trait Encoded: Message {
     fn stamp_ns(&self) -> u64;
 
     /// The same message with another stamp [ns].
-    #[must_use]
     fn with_stamp_ns(self, stamp_ns: u64) -> Self;
 
     /// Appends the bytes to `out`. Where Foxglove's schema has a Unix time, it is this host's.
@@ -128,13 +127,11 @@ pub fn picture_from_bytes(bytes: &[u8]) -> Result<(ImageHeader, Vec<u8>), String
 }
 
 /// Full name of the pictures' schema.
-#[must_use]
 pub fn picture_schema() -> &'static str {
     IMAGE_SCHEMA
 }
 
 /// A number that two builds agree on when their definitions of `schema` and of all that it uses agree.
-#[must_use]
 pub fn schema_checksum(schema: &str) -> u32 {
     crc32fast::hash(&descriptor(schema))
 }

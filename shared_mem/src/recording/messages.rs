@@ -91,7 +91,6 @@ impl ClipMessages {
     }
 
     /// The part of the file that could not be read so far; `None` while all is whole.
-    #[must_use]
     pub fn damage(&self) -> Option<String> {
         self.messages.damage().summary()
     }

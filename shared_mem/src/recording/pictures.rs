@@ -45,7 +45,6 @@ pub fn for_pictures<E: From<ReadError>>(
 
 impl JointSeries {
     /// Joint positions [rad] and the fastest joint's speed [rad/s] at a time, between rows; `None` outside of the series.
-    #[must_use]
     pub fn at(&self, time_ns: u64) -> Option<(Vec<f64>, f64)> {
         let next = self.stamps_ns.partition_point(|stamp| *stamp < time_ns);
         let before = next.checked_sub(1)?;

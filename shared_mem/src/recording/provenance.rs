@@ -37,7 +37,6 @@ struct Share<'a> {
 
 impl Provenance {
     /// Reads what the clips of a session say about themselves, and nothing else of them. Clips that cannot be read are left out.
-    #[must_use]
     pub fn of(session: &Session) -> Self {
         let clips = session.clips.iter().filter_map(|entry| {
             let origins = read_origins(&session.folder.join(&entry.file)).ok()?;
@@ -55,26 +54,22 @@ impl Provenance {
     }
 
     /// The same with the clips of another session.
-    #[must_use]
     pub fn with(mut self, other: Self) -> Self {
         self.clips.extend(other.clips);
         self
     }
 
     /// Its clips.
-    #[must_use]
     pub fn clips(&self) -> &[ClipOrigins] {
         &self.clips
     }
 
     /// Clips that do not say where they come from.
-    #[must_use]
     pub fn unknown(&self) -> usize {
         self.clips.iter().filter(|clip| clip.origins.is_unknown()).count()
     }
 
     /// Where the clips come from whose origin is known, if all of them have one source; the first one's words for it.
-    #[must_use]
     pub fn source(&self) -> Option<&Origin> {
         match &self.known()[..] {
             [one] => one.origin,
@@ -83,20 +78,17 @@ impl Provenance {
     }
 
     /// Whether nobody knows where any of its clips comes from.
-    #[must_use]
     pub fn is_unknown(&self) -> bool {
         self.known().is_empty()
     }
 
     /// What comes from where, in words, where the clips have several sources; `None` where they have one or say nothing.
-    #[must_use]
     pub fn mixture(&self) -> Option<String> {
         let known = self.known();
         (known.len() > 1).then(|| known.iter().map(Share::in_words).collect::<Vec<_>>().join(", "))
     }
 
     /// Whether clips of `origin` would be of another source than these.
-    #[must_use]
     pub fn differs_from(&self, origin: &Origin) -> bool {
         self.known().iter().any(|share| share.source.as_ref() != Some(&origin.source()))
     }

@@ -55,13 +55,11 @@ impl RawMessages {
     }
 
     /// Where the file says that it comes from, as far as it was read.
-    #[must_use]
     pub fn origins(&self) -> Origins {
         origins::said(&self.0)
     }
 
     /// The part of the file that could not be read so far; `None` while all is whole.
-    #[must_use]
     pub fn damage(&self) -> Option<String> {
         self.0.damage().summary()
     }

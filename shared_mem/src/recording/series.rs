@@ -22,37 +22,31 @@ pub struct JointSeries {
 
 impl JointSeries {
     /// Rows.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.stamps_ns.len()
     }
 
     /// True when there are no rows.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.stamps_ns.is_empty()
     }
 
     /// Positions of row `i` [rad]; empty beyond the end.
-    #[must_use]
     pub fn q_row(&self, i: usize) -> &[f64] {
         row(&self.q, self.dof, i).unwrap_or(&[])
     }
 
     /// Velocities of row `i` [rad/s]; `None` when not logged.
-    #[must_use]
     pub fn dq_row(&self, i: usize) -> Option<&[f64]> {
         row(&self.dq, self.dof, i)
     }
 
     /// Torques of row `i` [N m]; `None` when not logged.
-    #[must_use]
     pub fn tau_row(&self, i: usize) -> Option<&[f64]> {
         row(&self.tau, self.dof, i)
     }
 
     /// From the first stamp to the last [s].
-    #[must_use]
     pub fn duration(&self) -> f64 {
         duration(&self.stamps_ns)
     }
@@ -73,7 +67,6 @@ impl JointSeries {
     }
 
     /// The rows with these stamps [ns].
-    #[must_use]
     pub fn between(&self, stamps_ns: RangeInclusive<u64>) -> Self {
         let from = self.stamps_ns.partition_point(|stamp| stamp < stamps_ns.start());
         let to = self.stamps_ns.partition_point(|stamp| stamp <= stamps_ns.end());
@@ -81,7 +74,6 @@ impl JointSeries {
     }
 
     /// The rows listed in `rows`, in that order; numbers beyond the end are passed over.
-    #[must_use]
     pub fn select_rows(&self, rows: &[usize]) -> Self {
         let pick = |values: &[f64]| -> Vec<f64> {
             rows.iter().filter_map(|&i| row(values, self.dof, i)).flatten().copied().collect()
@@ -107,25 +99,21 @@ pub struct ObjectSeries {
 
 impl ObjectSeries {
     /// Poses.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.stamps_ns.len()
     }
 
     /// True when there are no poses.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.stamps_ns.is_empty()
     }
 
     /// From the first stamp to the last [s].
-    #[must_use]
     pub fn duration(&self) -> f64 {
         duration(&self.stamps_ns)
     }
 
     /// The poses listed in `rows`, in that order; numbers beyond the end are passed over.
-    #[must_use]
     pub fn select_rows(&self, rows: &[usize]) -> Self {
         let there = rows.iter().copied().filter(|row| *row < self.len().min(self.poses.len()));
         let (stamps_ns, poses) = there.map(|row| (self.stamps_ns[row], self.poses[row])).unzip();

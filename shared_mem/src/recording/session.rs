@@ -29,7 +29,6 @@ pub struct SessionFiles {
 
 impl SessionFiles {
     /// A command about this session, as it is typed.
-    #[must_use]
     pub fn command(&self, verb: &str) -> Command {
         Command::new(verb).path(&self.session).option_of("--cell", self.cell.as_deref())
     }

@@ -341,7 +341,6 @@ impl<W: Write> ClipWriter<W> {
     }
 
     /// Bytes that reached the file so far; what waits in the open chunk is not among them.
-    #[must_use]
     pub fn bytes_written(&self) -> u64 {
         self.bytes.load(Ordering::Relaxed)
     }

@@ -37,7 +37,6 @@ pub fn book_keeping() -> Result<PathBuf, PlaceError> {
 }
 
 /// Files of other users in shared memory under names of this user's, in every domain. None of them is used.
-#[must_use]
 pub fn foreign_files() -> Vec<ForeignFile> {
     all_foreign_files(rustix::process::geteuid().as_raw())
 }

@@ -141,7 +141,6 @@ impl ImageSubscriber {
     }
 
     /// Pictures so far that failed their check.
-    #[must_use]
     pub fn ignored(&self) -> u64 {
         self.ignored.count()
     }
@@ -157,13 +156,11 @@ fn header_of(sample: &Sample<Service, [u8], ImageHeaderWire>) -> Result<ImageHea
 
 impl ImageSample {
     /// What the bytes mean.
-    #[must_use]
     pub fn header(&self) -> &ImageHeader {
         &self.header
     }
 
     /// The bytes, row by row: height times stride of the header.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.sample.payload()
     }

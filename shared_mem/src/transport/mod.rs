@@ -81,7 +81,6 @@ impl Node {
 
     /// Messages that this node's subscribers received and did not hand on, because they failed their check: worth a remark
     /// at the first of a topic, and again whenever there are ten times as many. Empty in between.
-    #[must_use]
     pub fn newly_ignored(&self) -> Vec<Ignored> {
         self.tallies.news()
     }

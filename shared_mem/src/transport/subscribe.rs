@@ -82,7 +82,6 @@ impl<M: Message> Subscriber<M> {
     }
 
     /// Messages so far that failed their check.
-    #[must_use]
     pub fn ignored(&self) -> u64 {
         self.ignored.count()
     }

@@ -39,14 +39,12 @@ const ALIKE: f64 = 0.8;
 
 impl Plane {
     /// Distance of a point on the side of the normal [m].
-    #[must_use]
     pub fn distance(&self, point: &Point3<f64>) -> f64 {
         self.normal.dot(&point.coords) - self.offset
     }
 
     /// The plane with most points; `normals` of the points, of length 1, or none at all. Its own normal points as most of
     /// them do, or as was wanted.
-    #[must_use]
     pub fn largest(points: &[Point3<f64>], normals: &[Vector3<f64>], wanted: &Wanted) -> Option<Self> {
         if points.len() < 3 {
             return None;
@@ -130,7 +128,6 @@ impl Wanted {
 /// A level part of a scene: a table, a floor, a shelf.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
-    /// Its plane.
     pub plane: Plane,
     /// The middle of its points [m].
     pub middle: Point3<f64>,
@@ -146,7 +143,6 @@ const OF_TABLE: f64 = 1.0 / 3.0;
 
 /// The levels of a scene, the largest first: planes that face up, `within` so much of `up` [rad]; those after the first within 2
 /// degrees of it.
-#[must_use]
 pub fn levels(surface: &Surface, up: &Vector3<f64>, within: f64) -> Vec<Level> {
     let mut points: Vec<Point3<f64>> = surface.points.iter().map(|p| p.cast()).collect();
     let mut normals: Vec<Vector3<f64>> = surface.normals().iter().map(|n| n.cast()).collect();
@@ -172,7 +168,6 @@ pub fn levels(surface: &Surface, up: &Vector3<f64>, within: f64) -> Vec<Level> {
 }
 
 /// Which of the levels is the table: the highest that has a third of the largest one's points at least.
-#[must_use]
 pub fn table(levels: &[Level]) -> Option<usize> {
     let up = levels.first()?.plane.normal;
     let least = OF_TABLE * levels[0].plane.points as f64;

@@ -17,7 +17,6 @@ pub struct Surface {
 
 impl Surface {
     /// Outward normals of the corners, of length 1, from the triangles around each by their area; 0 for a corner of none.
-    #[must_use]
     pub fn normals(&self) -> Vec<Vector3<f32>> {
         let mut normals = vec![Vector3::zeros(); self.points.len()];
         for triangle in &self.triangles {
@@ -30,7 +29,6 @@ impl Surface {
     }
 
     /// The triangles all of whose corners `keep` wants, with their corners.
-    #[must_use]
     pub fn only(&self, keep: impl Fn(usize) -> bool) -> Self {
         let mut part = Self::default();
         let mut numbers = vec![u32::MAX; self.points.len()];
@@ -49,7 +47,6 @@ impl Surface {
     }
 
     /// The parts that hang together and have at least so many triangles.
-    #[must_use]
     pub fn without_islands(&self, least: usize) -> Self {
         let mut root: Vec<u32> = (0..self.points.len() as u32).collect();
         let find = |root: &mut Vec<u32>, mut i: u32| {
@@ -75,7 +72,6 @@ impl Surface {
     }
 
     /// Coarser: the corners in each cell of so wide a grid become their mean, with its colour.
-    #[must_use]
     pub fn clustered(&self, cell: f32) -> Self {
         let mut numbers: HashMap<[i32; 3], u32> = HashMap::new();
         let mut sums: Vec<([f32; 6], f32)> = Vec::new();
@@ -102,7 +98,6 @@ impl Surface {
     }
 
     /// As a Wavefront OBJ; colours stand behind the corners, as MeshLab, Open3D and Blender read them.
-    #[must_use]
     pub fn obj(&self) -> String {
         let mut out = String::new();
         for (p, [r, g, b]) in self.points.iter().zip(&self.colors) {

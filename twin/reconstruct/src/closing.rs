@@ -12,7 +12,6 @@ pub(crate) const TUNNEL: f32 = 2.0;
 const SHALLOW: f32 = 0.5;
 
 /// The field with the gaps filled into which no ball of this radius goes [voxel]; everywhere else it stays as it is.
-#[must_use]
 pub(crate) fn closed(field: &Field<f32>, radius: f32) -> Field<f32> {
     let grown: Vec<f32> = signed_distance(&field.grid, &field.distance).iter().map(|d| d - radius).collect();
     let closing = signed_distance(&field.grid, &grown).into_iter().map(|d| d + radius);

@@ -25,7 +25,6 @@ pub(crate) struct Cell<T> {
 
 impl Grid {
     /// Nodes that fill a box, about `count` of them, with room of `margin` nodes on every side.
-    #[must_use]
     pub fn filling(low: &Point3<f64>, high: &Point3<f64>, count: f64, margin: usize) -> Self {
         let size = (high - low).map(|edge| edge.max(1e-6));
         let rim = 2.0 * margin as f64;
@@ -41,56 +40,47 @@ impl Grid {
     }
 
     /// The same box with nodes twice as dense.
-    #[must_use]
     pub fn refined(&self) -> Self {
         Self { dims: self.dims.map(|n| 2 * n - 1), origin: self.origin, voxel: 0.5 * self.voxel }
     }
 
     /// Count of nodes.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.dims.iter().product()
     }
 
     /// Whether there is no node.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// Index of a node.
-    #[must_use]
     pub fn index(&self, [i, j, k]: [usize; 3]) -> usize {
         (k * self.dims[1] + j) * self.dims[0] + i
     }
 
     /// The node of an index.
-    #[must_use]
     pub fn node(&self, index: usize) -> [usize; 3] {
         let [x, y, _] = self.dims;
         [index % x, index / x % y, index / (x * y)]
     }
 
     /// Steps from a node to the next along x, y, z.
-    #[must_use]
     pub fn strides(&self) -> [usize; 3] {
         [1, self.dims[0], self.dims[0] * self.dims[1]]
     }
 
     /// Where a node lies [m].
-    #[must_use]
     pub fn position(&self, node: [usize; 3]) -> Point3<f64> {
         self.origin + Vector3::from(node.map(|i| i as f64)) * self.voxel
     }
 
     /// A place in steps between nodes, from the first node on.
-    #[must_use]
     pub fn steps(&self, point: &Point3<f64>) -> Point3<f64> {
         Point3::from((point - self.origin) / self.voxel)
     }
 
     /// Whether a node is at the rim of the box.
-    #[must_use]
     pub fn is_rim(&self, node: [usize; 3]) -> bool {
         (0..3).any(|axis| node[axis] == 0 || node[axis] + 1 == self.dims[axis])
     }
@@ -156,7 +146,6 @@ pub struct Field<T> {
 
 impl Field<f32> {
     /// The same between nodes twice as dense.
-    #[must_use]
     pub fn refined(&self) -> Self {
         let grid = self.grid.refined();
         let place = |index: usize| grid.node(index).map(|i| 0.5 * i as f32);
@@ -183,7 +172,6 @@ impl Field<f32> {
     }
 
     /// Signed distance [m] at a place of the scan; `None` outside the box.
-    #[must_use]
     pub fn distance_at(&self, point: &Point3<f64>) -> Option<f64> {
         let cell = self.grid.cell(self.grid.steps(point).coords.map(|v| v as f32).into())?;
         let nodes = self.grid.nodes(cell.base);
@@ -192,7 +180,6 @@ impl Field<f32> {
     }
 
     /// Signed distance [m] at a place of the scan and its derivative by the place; `None` outside the box.
-    #[must_use]
     pub fn slope_at(&self, point: &Point3<f64>) -> Option<(f64, Vector3<f64>)> {
         let cell = self.grid.cell(self.grid.steps(point).coords.into())?;
         let values = self.grid.nodes(cell.base).map(|node| f64::from(self.distance[node]));
@@ -201,7 +188,6 @@ impl Field<f32> {
     }
 
     /// Colour at a place of the scan, 0 to 1; `None` outside the box.
-    #[must_use]
     pub fn colour_at(&self, point: &Point3<f64>) -> Option<[f32; 3]> {
         let cell = self.grid.cell(self.grid.steps(point).coords.map(|v| v as f32).into())?;
         let mut sum = [0.0; 3];

@@ -30,19 +30,16 @@ pub struct SplatCloud {
 
 impl SplatCloud {
     /// How many coefficients each splat has.
-    #[must_use]
     pub fn coefficients(&self) -> usize {
         (self.degree + 1) * (self.degree + 1)
     }
 
     /// Mean colour of a splat over all directions: red, green, blue, 0 to 1 and, where it was trained, a little beyond.
-    #[must_use]
     pub fn colour(&self, number: usize) -> [f32; 3] {
         self.harmonics[number * self.coefficients()].map(|first| 0.5 + FIRST as f32 * first)
     }
 
     /// The splats whose number `keep` wants.
-    #[must_use]
     pub fn only(&self, keep: impl Fn(usize) -> bool) -> Self {
         let mut part = Self { degree: self.degree, ..Self::default() };
         let colors = self.harmonics.chunks_exact(self.coefficients());
@@ -56,7 +53,6 @@ impl SplatCloud {
     }
 
     /// The same splats turned, shifted and grown; their colours turn with them.
-    #[must_use]
     pub fn moved(&self, change: &Similarity3<f64>) -> Self {
         let (rotation, scale) = (change.isometry.rotation, change.scaling());
         let turns = turns(&rotation);

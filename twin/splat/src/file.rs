@@ -62,7 +62,6 @@ impl SplatCloud {
     }
 
     /// A 3DGS PLY.
-    #[must_use]
     pub fn ply(&self) -> Vec<u8> {
         ply::write(self)
     }

@@ -16,7 +16,6 @@ pub struct Lens {
 
 impl Lens {
     /// Where a point of the optical frame lands, and how that changes with the point.
-    #[must_use]
     pub fn project(&self, p: &Point3<f64>) -> ([f64; 2], Matrix2x3<f64>) {
         let (x, y) = (p.x / p.z, p.y / p.z);
         let (bent, slope) = self.distortion.bend(x, y);
@@ -27,14 +26,12 @@ impl Lens {
     }
 
     /// The direction that a pixel sees, with z = 1.
-    #[must_use]
     pub fn ray(&self, pixel: [f64; 2]) -> Vector3<f64> {
         let [x, y] = self.distortion.direction([0, 1].map(|i| (pixel[i] - self.centre[i]) / self.focal[i]));
         Vector3::new(x, y, 1.0)
     }
 
     /// Whether there is any distortion.
-    #[must_use]
     pub fn is_bent(&self) -> bool {
         self.distortion.is_bent()
     }

@@ -20,6 +20,7 @@
 //! | `straight` | the pinhole's picture beside the lens's |
 //! | `mesh`, `raster` | triangles of one colour, and a CPU rasteriser of them |
 //! | `reference` | the picture |
+#![warn(missing_docs)]
 
 mod cloud;
 mod compressed;

@@ -7,7 +7,6 @@ use std::path::Path;
 const HAND: usize = 8;
 
 /// Name of the file for a link; 0 is the base, 8 the hand.
-#[must_use]
 pub fn link_file(link: usize) -> String {
     if link >= HAND { "hand.ply".into() } else { format!("link{link}.ply") }
 }

@@ -20,13 +20,11 @@ pub struct Mesh {
 
 impl Mesh {
     /// From corners and triangles in double precision.
-    #[must_use]
     pub fn new((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>), color: [u8; 3]) -> Self {
         Self { points: points.iter().map(|p| p.cast::<f32>()).collect(), triangles, color }
     }
 
     /// A rectangle facing +z, around the point (x, y, z), with these half edges.
-    #[must_use]
     pub fn plate(centre: [f32; 3], half: [f32; 2], color: [u8; 3]) -> Self {
         let corner = |sx: f32, sy: f32| Point3::new(centre[0] + sx * half[0], centre[1] + sy * half[1], centre[2]);
         let points = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
@@ -34,7 +32,6 @@ impl Mesh {
     }
 
     /// All points within `radius` of the segment from `a` to `b`.
-    #[must_use]
     pub fn capsule(a: &Point3<f64>, b: &Point3<f64>, radius: f64, color: [u8; 3]) -> Self {
         let axis = b - a;
         let turn = UnitQuaternion::rotation_between(&Vector3::z(), &axis)

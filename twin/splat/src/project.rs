@@ -193,7 +193,6 @@ pub(super) fn matrix<T: Real>(&[w, x, y, z]: &[T; 4]) -> Matrix3<T> {
 }
 
 /// The splat with this number, seen by a camera; `None` when it is behind the camera, beside the picture, or too faint.
-#[must_use]
 pub fn project(
     cloud: &SplatCloud,
     number: usize,
@@ -219,7 +218,6 @@ pub(super) fn project_from(cloud: &SplatCloud, number: usize, view: &View<f64>) 
 }
 
 /// Between which ends the slope of the projection is taken, along a row and along a column, in the plane z = 1.
-#[must_use]
 pub fn slope_ends(lens: &Lens, size: [usize; 2]) -> [[f64; 2]; 2] {
     [0, 1].map(|i| {
         let ends = [0.0, size[i] as f64 - 1.0].map(|edge| {
@@ -234,7 +232,6 @@ pub fn slope_ends(lens: &Lens, size: [usize; 2]) -> [[f64; 2]; 2] {
 
 impl Projected {
     /// Share of light that it keeps back at a pixel.
-    #[must_use]
     pub fn alpha(&self, u: f64, v: f64) -> f64 {
         self.opacity * self.exponent(u, v).exp()
     }

@@ -43,7 +43,6 @@ const AMBIENT: f32 = 0.45;
 
 impl Raster {
     /// An empty picture; `light` points towards the light, camera frame.
-    #[must_use]
     pub fn new(width: usize, height: usize, pinhole: Pinhole, light: Vector3<f32>) -> Self {
         let pixels = width * height;
         Self {
@@ -70,13 +69,11 @@ impl Raster {
     }
 
     /// `1/z` of the nearest surface for every pixel, row by row [1/m]; 0 where there is none.
-    #[must_use]
     pub fn inverse_depth(&self) -> &[f32] {
         &self.inverse_depth
     }
 
     /// Colour of every pixel, row by row, as 0x00BBGGRR.
-    #[must_use]
     pub fn color(&self) -> &[u32] {
         &self.color
     }

@@ -76,7 +76,6 @@ struct Drawn {
 }
 
 /// Draws bodies once; [`Canvas`] is for the same view again and again.
-#[must_use]
 pub fn render(bodies: &[Body<'_>], lens: &Lens, size: [usize; 2], around: &Surroundings) -> Picture {
     Canvas::new(*lens, size).render(bodies, around)
 }
@@ -91,13 +90,11 @@ pub struct Canvas {
 
 impl Canvas {
     /// For pictures of so many columns and rows.
-    #[must_use]
     pub fn new(lens: Lens, size: [usize; 2]) -> Self {
         Self { lens, size, straight: Straight::new(&lens, size) }
     }
 
     /// Draws bodies.
-    #[must_use]
     pub fn render(&self, bodies: &[Body<'_>], around: &Surroundings) -> Picture {
         let size = self.size;
         let (drawn, lists) = self.front_to_back(bodies);

@@ -44,7 +44,6 @@ fn margin(lens: &Lens, seen: [usize; 2]) -> [usize; 2] {
 
 impl Straight {
     /// For pictures behind the lens of so many columns and rows.
-    #[must_use]
     pub fn new(lens: &Lens, seen: [usize; 2]) -> Self {
         let margin = margin(lens, seen);
         let size = [0, 1].map(|i| seen[i] + 2 * margin[i]);
@@ -63,7 +62,6 @@ impl Straight {
     }
 
     /// The straight picture's pixel for one behind the lens.
-    #[must_use]
     pub fn at(&self, pixel: usize) -> Option<usize> {
         match self.lookup.get(pixel) {
             None => Some(pixel),

@@ -47,7 +47,6 @@ pub struct HeldJoint {
 
 impl HeldJoint {
     /// All of them in one line, those of one reason together: `a, b (named as a finger is); c (follows `a`)`.
-    #[must_use]
     pub fn in_words(held: &[Self]) -> String {
         let mut reasons: Vec<&str> = held.iter().map(|joint| joint.why.as_str()).collect();
         let mut seen = HashSet::new();

@@ -15,7 +15,6 @@ const POLE: f64 = 300.0;
 /// A joint controller with its gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlLaw {
-    /// The equation.
     pub kind: ControllerKind,
     /// Stiffness k [N m/rad].
     pub stiffness: Joints,
@@ -38,18 +37,11 @@ pub enum GainError {
     Unknown(&'static str),
     /// No controller has such a gain.
     #[error("{key} cannot hold {value}; give 0 or a positive number for each joint")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// The gain.
-        value: f64,
-    },
+    Value { key: &'static str, value: f64 },
     /// A vector does not fit the arm.
     #[error("{key} holds {given} numbers; this arm has {dof} joints: give one for each")]
     Length {
-        /// The key.
         key: &'static str,
-        /// Numbers given.
         given: usize,
         /// Joints of the arm.
         dof: usize,
@@ -97,14 +89,12 @@ impl ControlLaw {
     /// Torque for a state and the command in force, gravity included [N m], kept within the torque limit.
     ///
     /// `nominal` is the model inside the controller: what it compensates for, which may differ from the arm.
-    #[must_use]
     #[inline]
     pub fn torque(&self, nominal: &ArmModel, state: &JointState, q_d: &Joints, dq_d: &Joints) -> Joints {
         self.torque_after(nominal, state, (q_d, dq_d), dq_d)
     }
 
     /// The same where the velocity that was desired a control period before is known, whose change a law may feed forward.
-    #[must_use]
     #[inline]
     pub fn torque_after(
         &self,

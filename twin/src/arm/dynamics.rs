@@ -28,13 +28,11 @@ pub(super) struct Response<const N: usize> {
 
 impl ArmModel {
     /// Torques that hold the arm still against gravity [N m].
-    #[must_use]
     pub fn gravity(&self, q: &Joints) -> Joints {
         self.holding(q, self.gravity)
     }
 
     /// Torques that hold the arm still against a free fall that is given in the base frame [m/s²] [N m].
-    #[must_use]
     pub fn holding(&self, q: &Joints, falls: [f64; 3]) -> Joints {
         with_dof!(self, N => {
             let links = first::<N, _>(&self.links);
@@ -44,13 +42,11 @@ impl ArmModel {
     }
 
     /// Free fall in the base frame [m/s²].
-    #[must_use]
     pub fn free_fall(&self) -> [f64; 3] {
         self.gravity
     }
 
     /// Torques of centrifugal and Coriolis forces [N m].
-    #[must_use]
     pub fn coriolis(&self, state: &JointState) -> Joints {
         with_dof!(self, N => {
             let links = first::<N, _>(&self.links);
@@ -60,7 +56,6 @@ impl ArmModel {
     }
 
     /// `coriolis + gravity`, at the price of one of them [N m].
-    #[must_use]
     pub fn bias(&self, state: &JointState) -> Joints {
         with_dof!(self, N => {
             let links = first::<N, _>(&self.links);
@@ -70,7 +65,6 @@ impl ArmModel {
     }
 
     /// Mass matrix with rotor inertia on its diagonal [kg m²], `[row][column]`; 0 from `dof` on.
-    #[must_use]
     pub fn mass_matrix(&self, q: &Joints) -> [Joints; MAX_JOINTS] {
         let mut out = [[0.0; MAX_JOINTS]; MAX_JOINTS];
         with_dof!(self, N => {
@@ -88,13 +82,11 @@ impl ArmModel {
     }
 
     /// Joint accelerations under joint torques [rad/s²].
-    #[must_use]
     pub fn accelerations(&self, state: &JointState, tau: &Joints) -> Joints {
         with_dof!(self, N => filled(&self.respond::<N>(first(&state.q), first(&state.dq), |_| *first(tau)).acceleration))
     }
 
     /// Joint torques that a force on the last link amounts to [N m]: add them to the motors' torques.
-    #[must_use]
     pub fn torque_of(&self, q: &Joints, load: &PointForce) -> Joints {
         let wrench = Spatial { angular: cross(load.point, load.force), linear: load.force };
         let mut out = [0.0; MAX_JOINTS];
@@ -105,7 +97,6 @@ impl ArmModel {
     }
 
     /// Kinetic energy, rotors included, plus potential energy (0 with all mass in the base's origin plane) [J].
-    #[must_use]
     pub fn energy(&self, state: &JointState) -> f64 {
         let mass = self.mass_matrix(&state.q);
         let mut kinetic = 0.0;

@@ -16,7 +16,6 @@ pub enum ModelError {
     /// The URDF makes no sense.
     #[error("{}: {what}; give a URDF that a robot_state_publisher accepts (xacro must be expanded first)", path.display())]
     Read {
-        /// The file.
         path: PathBuf,
         /// What the reader said.
         what: String,
@@ -24,7 +23,6 @@ pub enum ModelError {
     /// The URDF describes something else than one serial chain.
     #[error("{}: {what}", path.display())]
     Chain {
-        /// The file.
         path: PathBuf,
         /// Joint or link, and how to mend it.
         what: String,
@@ -37,9 +35,7 @@ pub enum ModelError {
     /// A vector of cell.toml does not fit the arm.
     #[error("`{key}` in cell.toml holds {given} values; this arm has {dof} joints: give one for each")]
     Length {
-        /// The key.
         key: &'static str,
-        /// Numbers given.
         given: usize,
         /// Joints of the arm.
         dof: usize,

@@ -51,7 +51,6 @@ enum LookAhead {
 
 impl Follower {
     /// At rest at `q`; no joint will go faster than `fastest` [rad/s]. Allocates; what follows does not.
-    #[must_use]
     pub fn at_rest(q: &Joints, fastest: &Joints, limits: Limits, period_s: f64) -> Self {
         let mut input = InputParameter::new(None);
         for i in 0..MAX_JOINTS {
@@ -74,7 +73,6 @@ impl Follower {
 
     /// The same with four fifths of the limits of acceleration and jerk, and slower towards the joints' stops: what is left
     /// lets whoever looks after the arm see a stop from wherever it is. It goes no way before [`Follower::set_speed`].
-    #[must_use]
     pub fn calm(q: &Joints, limits: &Limits, period_s: f64) -> Self {
         let mut calm = Self::at_rest(q, &[0.0; MAX_JOINTS], *limits, period_s);
         for (i, joint) in limits.counted().enumerate() {
@@ -191,7 +189,6 @@ impl Follower {
     }
 
     /// How fast the joints are to be at the end of the last period [rad/s].
-    #[must_use]
     pub fn velocity(&self) -> Joints {
         std::array::from_fn(|i| if i < self.limits.dof { self.input.current_velocity[i] } else { 0.0 })
     }
@@ -199,7 +196,6 @@ impl Follower {
 
 impl JointLimits {
     /// Where a target may lie: the range without what is so near to a stop that a joint may hardly move there [rad].
-    #[must_use]
     pub fn targets(&self) -> [f64; 2] {
         let (offset, stopping) = (self.velocity_offset, self.stopping());
         let loss = offset + stopping * reaction(self, LONGEST_PERIOD);

@@ -11,7 +11,6 @@ const STIFFNESS: Range = [0.05, 5e3];
 const DAMPING: Range = [0.02, 5.0];
 
 /// Stiffness of a joint, from 0 [N m/rad]; `None` where neither cell.toml nor the robot tells.
-#[must_use]
 pub fn stiffness_range(controller: &Controller, arm: &ArmModel, joint: usize) -> Option<Range> {
     if let Some(ranges) = &controller.stiffness_range {
         return ranges.of(joint);
@@ -22,7 +21,6 @@ pub fn stiffness_range(controller: &Controller, arm: &ArmModel, joint: usize) ->
 }
 
 /// Damping of a joint of such a stiffness [N m s/rad]; `None` where neither cell.toml nor the robot tells.
-#[must_use]
 pub fn damping_range(controller: &Controller, arm: &ArmModel, joint: usize) -> Option<Range> {
     if let Some(ranges) = &controller.damping_range {
         return ranges.of(joint);

@@ -60,7 +60,6 @@ pub struct Extent {
 impl ArmHull {
     /// The hull of a cell's arm, whose model is `model`: the links of an arm built like an FR3, or the line from joint to joint of another arm, of
     /// which nobody says how thick it is; and the tool. `None` where positions in space mean nothing.
-    #[must_use]
     pub fn of(cell: &Cell, model: &ArmModel) -> Option<Self> {
         if !model.has_geometry() {
             return None;
@@ -88,7 +87,6 @@ impl ArmHull {
     }
 
     /// Where the balls are at joint positions `q` [rad].
-    #[must_use]
     pub fn at(&self, q: &Joints) -> Extent {
         with_dof!(self.model, N => {
             let frames = Chain::<N>::at(first(&self.model.links), first(q)).frames;
@@ -105,7 +103,6 @@ impl ArmHull {
 
     /// Its balls at joint positions `q` [rad], each with the joint that it lies behind, from 0, with its centre and its radius [m]; the
     /// last two are the ends of the tool.
-    #[must_use]
     pub fn balls(&self, q: &Joints) -> Vec<(usize, [f64; 3], f64)> {
         with_dof!(self.model, N => {
             let frames = Chain::<N>::at(first(&self.model.links), first(q)).frames;
@@ -120,7 +117,6 @@ impl ArmHull {
 
     /// How fast any ball's centre moves at most while a joint moves at unit speed, whatever the pose, joint by joint:
     /// [m/rad], or 1 where a joint slides.
-    #[must_use]
     pub fn levers(&self) -> Joints {
         let mut levers = [0.0; MAX_JOINTS];
         for (joint, lever) in levers.iter_mut().enumerate().take(self.model.dof) {
@@ -130,7 +126,6 @@ impl ArmHull {
     }
 
     /// The same for heights alone: turning about an upright axis changes none. Only the first joint's axis stays as it is.
-    #[must_use]
     pub fn height_levers(&self) -> Joints {
         let mut levers = self.levers();
         let [x, y, z] = self.model.links[0].rotation.map(|row| row[2]);

@@ -24,14 +24,12 @@ impl Default for MassProperties {
 
 impl MassProperties {
     /// From the six numbers of a symmetric inertia `[xx, yy, zz, xy, xz, yz]` about the centre of mass.
-    #[must_use]
     pub fn new(mass: f64, centre: [f64; 3], inertia: [f64; 6]) -> Self {
         let [xx, yy, zz, xy, xz, yz] = inertia;
         Self { mass, centre: Vector3::from(centre), inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) }
     }
 
     /// The same body seen from a frame in which this one lies at `outer_from_inner`.
-    #[must_use]
     pub fn seen_from(&self, outer_from_inner: &Isometry3<f64>) -> Self {
         let r = outer_from_inner.rotation.to_rotation_matrix();
         Self {
@@ -42,7 +40,6 @@ impl MassProperties {
     }
 
     /// Both bodies as one (parallel-axis theorem).
-    #[must_use]
     pub fn joined_with(&self, other: &Self) -> Self {
         let mass = self.mass + other.mass;
         if mass <= 0.0 {
@@ -57,7 +54,6 @@ impl MassProperties {
     }
 
     /// The same with no principal moment of inertia below `least` [kg m²]: other programs refuse a body without one.
-    #[must_use]
     pub fn with_moments_from(&self, least: f64) -> Self {
         let mut own = self.inertia.symmetric_eigen();
         if own.eigenvalues.iter().all(|moment| *moment >= least) {
@@ -69,7 +65,6 @@ impl MassProperties {
 
     /// The tool of cell.toml in the flange frame: a homogeneous capsule whose axis runs along z from the flange's
     /// origin to `length - radius`, closed by half spheres of `radius`.
-    #[must_use]
     pub fn of_tool(tool: &Tool) -> Self {
         let (r, axis) = (tool.radius, tool.length - tool.radius);
         // Volumes over pi r²: the cylinder has `axis`, both half spheres together 4/3 r.

@@ -13,19 +13,16 @@ pub type Jacobian = [[f64; 6]; MAX_JOINTS];
 
 impl ArmModel {
     /// The flange in the base frame.
-    #[must_use]
     pub fn flange(&self, q: &Joints) -> Pose<Base, Flange> {
         Pose::from_isometry(isometry(&self.last_frame(q)) * self.flange)
     }
 
     /// The end of the tool, axes parallel to the flange's; the flange itself without a tool.
-    #[must_use]
     pub fn tip(&self, q: &Joints) -> Pose<Base, Tip> {
         Pose::from_isometry(self.flange(q).isometry() * Translation3::new(0.0, 0.0, self.tool_length))
     }
 
     /// The flange in the base frame as the robot reports it: homogeneous 4x4, column-major [m].
-    #[must_use]
     pub fn O_T_EE(&self, q: &Joints) -> [f64; 16] {
         let matrix = self.flange(q).isometry().to_homogeneous();
         let mut out = [0.0; 16];
@@ -34,7 +31,6 @@ impl ArmModel {
     }
 
     /// Jacobian of the point of the last link that lies at `point` in the base frame [m].
-    #[must_use]
     pub fn jacobian(&self, q: &Joints, point: [f64; 3]) -> Jacobian {
         let mut out = [[0.0; 6]; MAX_JOINTS];
         for (column, axis) in out.iter_mut().zip(self.axes(q)).take(self.dof) {
@@ -45,7 +41,6 @@ impl ArmModel {
     }
 
     /// Origin of every joint's frame in the base frame [m]: on the joint's axis, where the next link begins.
-    #[must_use]
     pub fn joint_origins(&self, q: &Joints) -> [[f64; 3]; MAX_JOINTS] {
         with_dof!(self, N => {
             let mut out = [[0.0; 3]; MAX_JOINTS];
@@ -57,7 +52,6 @@ impl ArmModel {
     }
 
     /// Frame of every link behind a joint, in the base frame: z along the joint's axis. Identity from `dof` on.
-    #[must_use]
     pub fn link_frames(&self, q: &Joints) -> [Isometry3<f64>; MAX_JOINTS] {
         with_dof!(self, N => {
             let mut out = [Isometry3::identity(); MAX_JOINTS];

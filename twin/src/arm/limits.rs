@@ -59,7 +59,6 @@ impl JointLimits {
 
     /// Highest speed towards `q_max` (`direction` +1) or `q_min` (-1) at position `q`, when at most `deceleration` is
     /// there for stopping: `min(v_max, max(0, -offset + sqrt(2 dec distance)))`, the FR3's own rule.
-    #[must_use]
     pub fn speed_towards(&self, direction: f64, q: f64, deceleration: f64) -> f64 {
         let distance = if direction > 0.0 { self.q_max - q } else { q - self.q_min };
         let stoppable = (2.0 * deceleration * distance.max(0.0)).sqrt() - self.velocity_offset;
@@ -68,13 +67,11 @@ impl JointLimits {
 
     /// Deceleration that whoever looks ahead counts on for stopping [rad/s²]: the position-dependent speed limit's, and a tenth
     /// less than the highest acceleration, which covers control periods being finite.
-    #[must_use]
     pub fn stopping(&self) -> f64 {
         self.deceleration.min(STOPPING_SHARE * self.acceleration)
     }
 
     /// Slowest (most negative) and fastest speed at position `q` [rad/s].
-    #[must_use]
     pub fn speed_bounds(&self, q: f64) -> [f64; 2] {
         [-self.speed_towards(-1.0, q, self.deceleration), self.speed_towards(1.0, q, self.deceleration)]
     }
@@ -91,13 +88,11 @@ pub struct Limits {
 
 impl Limits {
     /// Franka Research 3, system image 5.9.0 and later.
-    #[must_use]
     pub fn fr3() -> Self {
         Self::braked(Self::of_model(&ArmModel::fr3()))
     }
 
     /// The arm of a cell, whose model is `arm`. Torques may be lowered by cell.toml, never raised beyond an FR3's.
-    #[must_use]
     pub fn of(cell: &Cell, arm: &ArmModel) -> Self {
         let limits = Self::of_model(arm);
         if cell.robot.as_ref().and_then(|robot| robot.model.as_deref()) != Some("fr3") {

@@ -85,7 +85,6 @@ pub struct JointState {
 
 impl JointState {
     /// At rest at `q`.
-    #[must_use]
     pub fn at_rest(q: Joints) -> Self {
         Self { q, dq: [0.0; MAX_JOINTS] }
     }

@@ -50,7 +50,6 @@ pub struct ArmModel {
 
 impl ArmModel {
     /// The Franka FR3 without a hand.
-    #[must_use]
     pub fn fr3() -> Self {
         Self::from_chain(fr3::chain()).expect("the built-in chain has seven joints with inertia")
     }
@@ -73,7 +72,6 @@ impl ArmModel {
     }
 
     /// Joints of a URDF's text that move no inertia; a rotor stands in for it.
-    #[must_use]
     pub fn joints_without_inertia(&self) -> Vec<&str> {
         self.without_inertia.iter().map(|joint| self.joint_names[*joint].as_str()).collect()
     }
@@ -207,19 +205,16 @@ impl ArmModel {
     }
 
     /// Number of joints.
-    #[must_use]
     pub fn dof(&self) -> usize {
         self.dof
     }
 
     /// Names of the joints from base to flange, as recordings have them.
-    #[must_use]
     pub fn joint_names(&self) -> &[String] {
         &self.joint_names
     }
 
     /// The same as the arm's URDF has them.
-    #[must_use]
     pub fn described_joint_names(&self) -> &[String] {
         self.described_names.as_deref().unwrap_or(&self.joint_names)
     }
@@ -243,26 +238,22 @@ impl ArmModel {
 
     /// Movable joints of the URDF that are no joints of the arm: fingers and the like, which are held where they are at 0, or as
     /// near to it as their limits allow.
-    #[must_use]
     pub fn held_joints(&self) -> &[HeldJoint] {
         &self.held_joints
     }
 
     /// What may be meant otherwise by the URDF, one sentence each: a last joint that may be a finger's.
-    #[must_use]
     pub fn doubts(&self) -> &[String] {
         &self.doubts
     }
 
     /// `false` where only joint names are known: then positions in space mean nothing.
-    #[must_use]
     pub fn has_geometry(&self) -> bool {
         self.has_geometry
     }
 
     /// Whether the links between the joints are those of `other`, to two centimetres and three degrees: more than any arm is off
     /// from its drawing. How the base stands and what is mounted at the end does not count.
-    #[must_use]
     pub fn is_built_like(&self, other: &Self) -> bool {
         let near = |a: &[f64], b: &[f64], off: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() < off);
         let alike = |(a, b): (&Link, &Link)| {
@@ -276,49 +267,41 @@ impl ArmModel {
     }
 
     /// Lowest joint positions [rad].
-    #[must_use]
     pub fn q_min(&self) -> &Joints {
         &self.q_min
     }
 
     /// Highest joint positions [rad].
-    #[must_use]
     pub fn q_max(&self) -> &Joints {
         &self.q_max
     }
 
     /// Highest joint speeds [rad/s]; infinite where not known.
-    #[must_use]
     pub fn velocity_limit(&self) -> &Joints {
         &self.velocity_limit
     }
 
     /// Largest joint torques [N m]; infinite where not known.
-    #[must_use]
     pub fn torque_limit(&self) -> &Joints {
         &self.torque_limit
     }
 
     /// A pose to start from, inside the limits [rad].
-    #[must_use]
     pub fn ready(&self) -> &Joints {
         &self.ready
     }
 
     /// Rotor inertia seen at each joint [kg m²].
-    #[must_use]
     pub fn rotor_inertia(&self) -> Joints {
         self.links.map(|link| link.rotor)
     }
 
     /// Mass of all links and what is mounted on them [kg]; 0 where only joints are known.
-    #[must_use]
     pub fn moving_mass(&self) -> f64 {
         self.links.iter().take(self.dof).map(|link| link.body.mass).sum()
     }
 
     /// Flange to the end of the tool along the flange's z axis [m]; 0 without a tool.
-    #[must_use]
     pub fn tool_length(&self) -> f64 {
         self.tool_length
     }

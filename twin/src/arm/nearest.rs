@@ -37,7 +37,6 @@ pub struct Nearest {
 impl ArmModel {
     /// Joints near `from` and within [`super::JointLimits::targets`] that bring the flange to `target`, or as near to it as
     /// corrections from there lead. Allocates nothing.
-    #[must_use]
     pub fn nearest(&self, limits: &Limits, from: &Joints, target: &Isometry3<f64>) -> Nearest {
         let mut q = within(limits, from);
         for _ in 0..CORRECTIONS {

@@ -32,7 +32,6 @@ pub struct Part {
 
 impl ArmModel {
     /// The joints from base to flange. What is mounted at the flange counts to the last link.
-    #[must_use]
     pub fn parts(&self) -> Vec<Part> {
         let mut before = UnitQuaternion::identity();
         (0..self.dof.min(MAX_JOINTS))
@@ -60,7 +59,6 @@ impl ArmModel {
 
     /// What one newton metre accelerates each joint by while all stand at 0 and the others are free [1/(kg m²)]: the diagonal
     /// of the inverse mass matrix.
-    #[must_use]
     pub fn mobilities(&self) -> Joints {
         let (state, rest) =
             (JointState::at_rest([0.0; MAX_JOINTS]), self.bias(&JointState::at_rest([0.0; MAX_JOINTS])));
@@ -75,7 +73,6 @@ impl ArmModel {
     }
 
     /// The flange in the last part's frame.
-    #[must_use]
     pub fn flange_on_last_part(&self) -> Isometry3<f64> {
         let turn = self.turns().last().copied().unwrap_or_else(UnitQuaternion::identity);
         Isometry3::from_parts(Translation3::identity(), turn) * self.flange

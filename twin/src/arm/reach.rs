@@ -16,7 +16,6 @@ const LARGEST: f64 = 0.2;
 impl ArmModel {
     /// Joints that bring a point of the flange and the axes there, `flange_from_point`, to `target`: the nearest ones to `from`,
     /// whatever their limits; `None` out of reach.
-    #[must_use]
     pub fn reach(&self, from: &Joints, flange_from_point: &Isometry3<f64>, target: &Isometry3<f64>) -> Option<Joints> {
         let mut q = *from;
         for _ in 0..CORRECTIONS {
@@ -37,7 +36,6 @@ impl ArmModel {
 
     /// Smallest motion of the joints that moves a point of the last link at `point` by `motion`: x, y, z, then a rotation
     /// vector, or the velocities of both.
-    #[must_use]
     pub fn joints_for(&self, q: &Joints, point: Point3<f64>, motion: &Vector6<f64>) -> Joints {
         let columns = self.jacobian(q, point.coords.into());
         let jacobian = DMatrix::from_fn(6, self.dof(), |row, joint| columns[joint][row]);

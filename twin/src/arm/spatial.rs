@@ -1,7 +1,6 @@
 //! Three-vectors and rotations as plain arrays, written out so that the compiler keeps them in registers: the arm's
 //! equations of motion are evaluated millions of times a minute. Called by the other files of [`crate::arm`] only.
 
-/// A vector.
 pub(super) type Vec3 = [f64; 3];
 /// A rotation by its rows: `rows[r][c]`.
 pub(super) type Rot3 = [[f64; 3]; 3];

@@ -22,7 +22,6 @@ pub struct Trailing {
     stiffness: Joints,
     /// d [N m s/rad].
     damping: Joints,
-    /// f.
     follow: f64,
 }
 
@@ -43,7 +42,6 @@ pub struct Trail {
 impl Trailing {
     /// `model` under `law`, as a robot's own controller runs it. `None` where the law is none of a spring and a damper on
     /// each joint, or feeds the acceleration forward.
-    #[must_use]
     pub fn new(model: &ArmModel, law: &ControlLaw) -> Option<Self> {
         let follow = match law.kind {
             ControllerKind::JointImpedance | ControllerKind::JointVelocity | ControllerKind::Unstated => 1.0,
@@ -54,7 +52,6 @@ impl Trailing {
     }
 
     /// The same with the gains of a law that damps the difference of velocities. `None` where a joint has no spring.
-    #[must_use]
     pub fn impedance(model: &ArmModel, stiffness: &Joints, damping: &Joints) -> Option<Self> {
         Self::with_gains(model, stiffness, damping, 1.0)
     }
@@ -65,7 +62,6 @@ impl Trailing {
     }
 
     /// From `state` on, told `command` (positions and velocities).
-    #[must_use]
     pub fn from(&self, state: &JointState, command: &JointState) -> Trail {
         let mass = self.mass(&state.q);
         let mut factors = mass;
@@ -120,7 +116,6 @@ impl Trailing {
     ///
     /// The energy `E` of the gap `e` and its rate, `e' k e + de' M de`, is fed by the commanded acceleration alone:
     /// `d sqrt(E) <= |ddq_d|_M dt`, which sums up to `sqrt(M_ii) change_i` a joint; and `k_i e_i² <= E`.
-    #[must_use]
     pub fn swing(&self, trail: &Trail, command: &JointState, change: &Joints) -> Joints {
         if self.follow == 0.0 {
             return self.each(|_| f64::INFINITY);

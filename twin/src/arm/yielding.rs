@@ -34,7 +34,6 @@ pub struct Yielding {
 
 impl ArmModel {
     /// Pose and velocity of the flange.
-    #[must_use]
     pub fn flange_motion(&self, state: &JointState) -> FlangeMotion {
         with_dof!(self, N => {
             let chain = Chain::<N>::at(first(&self.links), first(&state.q));
@@ -50,7 +49,6 @@ impl ArmModel {
 
     /// How the arm yields at `q`. A joint that `springs` says lies behind a gear that yields leaves its rotor behind; `grip`
     /// is what joints resist besides [kg m²].
-    #[must_use]
     pub fn yielding(&self, q: &Joints, springs: impl Fn(usize) -> bool, grip: &Joints) -> Yielding {
         with_dof!(self, N => {
             let links = first::<N, _>(&self.links);
@@ -102,13 +100,11 @@ impl Yielding {
     }
 
     /// Joint accelerations under a wrench (or what follows from its integrals).
-    #[must_use]
     pub fn joints_under(&self, wrench: &Vector6<f64>) -> Joints {
         combined(&self.joints, wrench)
     }
 
     /// Joint torques of a wrench [N m].
-    #[must_use]
     pub fn torques_under(&self, wrench: &Vector6<f64>) -> Joints {
         combined(&self.torques, wrench)
     }

@@ -14,7 +14,6 @@ pub struct ArmRollout<'a> {
     pub arm: &'a ArmModel,
     /// The model inside the controller; the very same reference where it is exact, which saves a third of the time.
     pub nominal: &'a ArmModel,
-    /// The controller.
     pub law: &'a ControlLaw,
     /// What acts besides; `arm` is then the real arm that they make of `nominal`.
     pub effects: Option<&'a ArmEffects>,
@@ -90,14 +89,12 @@ impl Reading {
     }
 
     /// The reading `share` of a period after `before`; torques hold over the period that ends with `self`.
-    #[must_use]
     pub(crate) fn after(&self, before: &Self, share: f64) -> Self {
         Self { state: between(&before.state, &self.state, share), ..*self }
     }
 }
 
 /// State between two ticks, `share` of the period after the first: the cubic through both positions and velocities.
-#[must_use]
 pub fn between(before: &JointState, after: &JointState, share: f64) -> JointState {
     if share >= 1.0 {
         return *after;

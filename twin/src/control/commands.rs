@@ -35,7 +35,6 @@ impl CommandTrack {
     ///
     /// Desired velocities that were not logged are the difference to the command before: what a controller can do
     /// that is given positions alone.
-    #[must_use]
     pub fn new(desired: &JointSeries) -> Option<Self> {
         if desired.is_empty() {
             return None;
@@ -49,7 +48,6 @@ impl CommandTrack {
     }
 
     /// Stretches too long to fill or to hold through.
-    #[must_use]
     pub fn holes(&self) -> &[Hole] {
         &self.holes
     }
@@ -91,7 +89,6 @@ impl CommandTrack {
     ///
     /// A command belongs to the tick nearest to its stamp: stamps of a 1 kHz log jitter around the ticks they belong
     /// to. Before the first command the first one holds.
-    #[must_use]
     #[inline]
     pub fn in_force(&self, now_ns: u64, from: usize) -> usize {
         let mut row = from;
@@ -102,20 +99,17 @@ impl CommandTrack {
     }
 
     /// [`CommandTrack::in_force`] without knowing where to begin.
-    #[must_use]
     pub fn at(&self, now_ns: u64) -> usize {
         self.stamps_ns.partition_point(|stamp| *stamp <= now_ns + TICK_NS / 2).saturating_sub(1)
     }
 
     /// Desired positions of a row [rad].
-    #[must_use]
     #[inline]
     pub fn q_d(&self, row: usize) -> &Joints {
         &self.q_d[row]
     }
 
     /// Desired velocities of a row [rad/s].
-    #[must_use]
     #[inline]
     pub fn dq_d(&self, row: usize) -> &Joints {
         &self.dq_d[row]

@@ -60,7 +60,6 @@ impl Plant {
     }
 
     /// What a rollout of the arm alone takes.
-    #[must_use]
     pub fn rollout(&self) -> ArmRollout<'_> {
         let (arm, effects) = match &self.hidden {
             Some((effects, arm)) => (arm, Some(effects)),
@@ -71,7 +70,6 @@ impl Plant {
     }
 
     /// The arm that moves.
-    #[must_use]
     pub fn arm(&self) -> &ArmModel {
         self.rollout().arm
     }
@@ -88,7 +86,6 @@ impl Plant {
     }
 
     /// The model inside the controller.
-    #[must_use]
     pub fn nominal(&self) -> &ArmModel {
         self.laden.as_ref().unwrap_or(&self.nominal)
     }

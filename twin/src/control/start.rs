@@ -26,7 +26,6 @@ impl ArmRollout<'_> {
     /// A first guess, the row itself, is simulated for 30 ms under the commands; position and velocity at its beginning are then those
     /// that bring the simulation nearest to the measured positions (least squares, joint by joint). So a motion that sets off in
     /// this time does not pass for initial velocity, nor does what the controller does about a guess that is off.
-    #[must_use]
     pub fn start_state(&self, measured: &JointSeries, from: usize, commands: &CommandTrack) -> Option<JointState> {
         let first = *measured.stamps_ns.get(from)?;
         let within = |time: u64| measured.stamps_ns[from..].iter().take_while(|stamp| **stamp - first <= time).count();

@@ -58,7 +58,6 @@ pub enum Change {
     YawInertia(f64),
     /// Friction on the table: `1 + size` times the mean along `axis` [rad from the base's x axis], `1 - size` across.
     FrictionAlong {
-        /// How much.
         size: f64,
         /// Where to [rad].
         axis: f64,

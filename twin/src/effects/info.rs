@@ -46,7 +46,6 @@ pub enum Place {
 
 impl Stage {
     /// Name in reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Control => "control",
@@ -66,7 +65,6 @@ pub struct EffectInfo {
     pub stage: Stage,
     /// Where it acts.
     pub acts_on: Place,
-    /// Its parameters.
     pub parameters: &'static [Parameter],
     /// Names of effects that look alike in some recordings.
     pub confusable_with: &'static [&'static str],
@@ -83,14 +81,12 @@ pub struct EffectInfo {
 impl EffectInfo {
     /// What to do about this effect in `cell`, where `numbers` are its parameters by name; one that is not known takes its
     /// resting value.
-    #[must_use]
     pub fn remedy(&'static self, cell: &Cell, numbers: &dyn Fn(&str) -> Option<Vec<f64>>) -> Remedy {
         (self.remedy)(&Found::new(self.parameters, numbers, cell))
     }
 
     /// What this effect changes in a model of `cell`, where `numbers` are its parameters by name; one that is not known takes
     /// its resting value.
-    #[must_use]
     pub fn changes(&'static self, cell: &Cell, numbers: &dyn Fn(&str) -> Option<Vec<f64>>) -> Vec<Change> {
         (self.model)(&Found::new(self.parameters, numbers, cell))
     }

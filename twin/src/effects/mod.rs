@@ -81,7 +81,6 @@ impl Effects {
     }
 
     /// Whether there is none at all.
-    #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }

@@ -3,7 +3,6 @@
 /// How many numbers a parameter holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
-    /// One.
     Number,
     /// One for each joint; a single number stands for all joints.
     PerJoint,
@@ -71,9 +70,7 @@ pub enum OnTable {
 /// What is met on robots that are built unlike the FR3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Elsewhere {
-    /// The same.
     Same,
-    /// Another range.
     Range([f64; 2]),
     /// So many times the joint's torque limit in N m; the same where that is not known.
     OfTorqueLimit([f64; 2]),
@@ -173,7 +170,6 @@ impl Parameter {
     }
 
     /// The value that changes nothing, or the default of a parameter that says how.
-    #[must_use]
     pub fn resting_value(&self) -> f64 {
         match self.role {
             Role::Size { neutral } => neutral,

@@ -7,14 +7,12 @@ use super::{arm, camera, hit, slide};
 use std::sync::LazyLock;
 
 /// Every effect, stage by stage.
-#[must_use]
 pub fn registry() -> &'static [EffectInfo] {
     static EFFECTS: LazyLock<Vec<EffectInfo>> = LazyLock::new(|| [arm::EFFECTS, BEYOND_THE_ARM].concat());
     &EFFECTS
 }
 
 /// The effect with this name.
-#[must_use]
 pub fn find(name: &str) -> Option<&'static EffectInfo> {
     registry().iter().find(|effect| effect.name == name)
 }
@@ -37,7 +35,6 @@ fn nearest(name: &str) -> &'static str {
 
 impl EffectInfo {
     /// Whether it may be what a cell has and its model lacks; else its numbers are identified with the model's own.
-    #[must_use]
     pub fn is_cause(&self) -> bool {
         self.name != unknown_weight().name
     }
@@ -45,7 +42,6 @@ impl EffectInfo {
 
 /// The weight of links whose masses are not known: no cause, since every arm has weight, but numbers to identify where a cell
 /// gives no masses.
-#[must_use]
 pub fn unknown_weight() -> &'static EffectInfo {
     static WEIGHT: EffectInfo = arm::joint_weight::EFFECT;
     &WEIGHT

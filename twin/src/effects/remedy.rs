@@ -61,7 +61,6 @@ impl<'a> Found<'a> {
         self.all(name)[0]
     }
 
-    /// A vector.
     pub(super) fn vector<const N: usize>(&self, name: &str) -> [f64; N] {
         let all = self.all(name);
         std::array::from_fn(|i| all.get(i).copied().unwrap_or(0.0))

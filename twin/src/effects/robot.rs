@@ -33,7 +33,6 @@ impl Robot {
     }
 
     /// Values of a parameter that are met in practice, of this joint (from 0) or of the whole arm.
-    #[must_use]
     pub fn range(&self, parameter: &Parameter, joint: Option<usize>) -> [f64; 2] {
         let joint = joint.unwrap_or(0);
         let times = |share: [f64; 2], whole: f64| {

@@ -12,7 +12,6 @@ pub struct Separation {
     pub record: &'static [Experiment],
 }
 
-/// One recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Experiment {
     /// All joints swing at frequencies that rise to 10 Hz.
@@ -33,7 +32,6 @@ pub enum Experiment {
     StrokeAgainToolTurned,
     /// One new stroke.
     OneStroke,
-    /// New strokes.
     Strokes,
     /// New strokes at half the usual speed.
     StrokesSlower,

@@ -7,7 +7,6 @@ use shared_mem::theta::EffectTheta;
 use toml::Value;
 
 /// The blocks that cell.toml's `[controller]` stands for.
-#[must_use]
 pub fn stated(controller: Option<&Controller>) -> Vec<EffectTheta> {
     let Some(controller) = controller else { return Vec::new() };
     let given = [

@@ -22,21 +22,16 @@ pub enum EffectError {
     /// No such parameter.
     #[error("effect `{effect}` has no parameter `{given}`; it takes {known}")]
     Parameter {
-        /// The effect.
         effect: &'static str,
         /// The key given.
         given: String,
-        /// Its keys.
         known: String,
     },
     /// A parameter is not given.
     #[error("effect `{effect}` lacks `{parameter}` [{unit}]; add `{parameter} = ` and {wanted}")]
     Missing {
-        /// The effect.
         effect: &'static str,
-        /// The key.
         parameter: &'static str,
-        /// Its unit.
         unit: &'static str,
         /// What to write.
         wanted: String,
@@ -44,11 +39,8 @@ pub enum EffectError {
     /// A parameter is something else than what is wanted.
     #[error("`{parameter}` of effect `{effect}` does not fit; give {wanted} [{unit}]")]
     Form {
-        /// The effect.
         effect: &'static str,
-        /// The key.
         parameter: &'static str,
-        /// Its unit.
         unit: &'static str,
         /// What to write.
         wanted: String,
@@ -56,13 +48,10 @@ pub enum EffectError {
     /// A value without meaning.
     #[error("`{parameter}` of effect `{effect}` cannot be {value}{}; give {wanted}", behind(unit))]
     Value {
-        /// The effect.
         effect: &'static str,
-        /// The key.
         parameter: &'static str,
         /// The number given.
         value: f64,
-        /// Its unit.
         unit: &'static str,
         /// What would do.
         wanted: String,
@@ -124,7 +113,6 @@ impl Values {
         }
     }
 
-    /// A vector.
     pub(super) fn vector<const N: usize>(&self, name: &str) -> [f64; N] {
         std::array::from_fn(|i| self.of(name)[i])
     }

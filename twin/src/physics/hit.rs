@@ -26,7 +26,6 @@ const CALM: f64 = 12.0;
 /// The tool against one place of the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Press {
-    /// The place.
     pub touch: Touch,
     /// Of the tool's point there [m/s].
     pub tool_velocity: Vector3<f64>,
@@ -51,7 +50,6 @@ pub struct ContactMotion {
 
 impl ContactLaw {
     /// What it asks of an object of `mass` [kg].
-    #[must_use]
     pub fn motion(&self, mass: f64) -> ContactMotion {
         ContactMotion {
             frequency: (self.stiffness / mass).sqrt(),
@@ -79,7 +77,6 @@ impl Press {
     }
 
     /// Whether nothing is left of the hit, and within `dt` no other begins, where the place moves with `velocity` [m/s].
-    #[must_use]
     pub fn is_calm(&self, velocity: &Vector3<f64>, dt: f64) -> bool {
         let (depth, rate) = (self.touch.depth, self.approach(velocity));
         if depth > 0.0 {
@@ -96,19 +93,16 @@ impl Press {
 
 impl ContactMotion {
     /// Of the undamped oscillation [rad/s].
-    #[must_use]
     pub fn frequency(&self) -> f64 {
         self.frequency
     }
 
     /// Damping over the critical one.
-    #[must_use]
     pub fn damping_ratio(&self) -> f64 {
         self.damping_ratio
     }
 
     /// A step that follows the contact: a twentieth of its duration [s].
-    #[must_use]
     pub fn step(&self) -> f64 {
         STEP_ANGLE / self.frequency
     }

@@ -16,7 +16,6 @@ const FLAT: f64 = 1e-9;
 pub struct Hull {
     /// Corners [m].
     pub corners: Vec<Point3<f64>>,
-    /// Faces.
     pub faces: Vec<Face>,
     /// Directions of its edges, parallel ones once.
     pub edges: Vec<Vector3<f64>>,
@@ -43,7 +42,6 @@ pub struct Face {
 
 impl Hull {
     /// The convex hull of points; `None` where they span no volume.
-    #[must_use]
     pub fn of(points: &[Point3<f64>]) -> Option<Self> {
         let points: Vec<Vector> = points.iter().map(convert::point).collect();
         let shape = SharedShape::convex_hull(&points)?;

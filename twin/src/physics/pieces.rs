@@ -16,7 +16,6 @@ const MOST: u32 = 64;
 pub type Piece = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 
 /// The convex pieces of a closed mesh, counter-clockwise seen from outside. Lengths are metres.
-#[must_use]
 pub fn convex_pieces(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<Piece> {
     let points: Vec<Vector> = points.iter().map(convert::point).collect();
     let parameters = VHACDParameters {

@@ -14,13 +14,11 @@ use std::sync::Arc;
 pub enum Surface {
     /// A box by half its edge lengths [m].
     Box(Vector3<f64>),
-    /// Triangles.
     Mesh(Arc<TriMesh>),
 }
 
 impl Surface {
     /// `None` when a mesh has no triangles.
-    #[must_use]
     pub fn new(shape: &ObjectShape) -> Option<Self> {
         match shape {
             ObjectShape::Box { half_extents } => Some(Self::Box(*half_extents)),
@@ -32,7 +30,6 @@ impl Surface {
     }
 
     /// From a point to the closest one of the surface, inside and outside alike [m].
-    #[must_use]
     pub fn distance(&self, point: &Point3<f64>) -> f64 {
         match self {
             Self::Box(half) => distance_from_box(half, &point.coords).0.abs(),

@@ -136,7 +136,6 @@ impl TableObject {
     }
 
     /// What it does now, to go on from later.
-    #[must_use]
     pub fn motion(&self) -> &ObjectMotion {
         &self.motion
     }
@@ -239,7 +238,6 @@ impl TableObject {
     }
 
     /// Longest step that follows the object under a tool that pushes steadily [s].
-    #[must_use]
     pub fn pushed_step(&self) -> f64 {
         if self.motion.standing.is_some() { PUSHED_STEP } else { LEANING_STEP }
     }
@@ -259,44 +257,37 @@ impl TableObject {
     }
 
     /// Geometric centre in the base frame.
-    #[must_use]
     pub fn pose(&self) -> Pose<Base, Object> {
         Pose::from_isometry(self.isometry())
     }
 
     /// Velocity of the body's point that is at `point` now, base frame [m/s].
-    #[must_use]
     pub fn velocity_at(&self, point: &Point3<f64>) -> Vector3<f64> {
         self.motion.body.velocity + self.motion.body.angular_velocity.cross(&(point - self.motion.body.centre))
     }
 
     /// Velocity of the geometric centre, base frame [m/s].
-    #[must_use]
     pub fn centre_velocity(&self) -> Vector3<f64> {
         self.velocity_at(&Point3::from(self.isometry().translation.vector))
     }
 
     /// Whether it stands still and does so until something touches it.
-    #[must_use]
     pub fn rests(&self) -> bool {
         self.motion.rests
     }
 
     /// Angular velocity, base frame [rad/s].
-    #[must_use]
     pub fn angular_velocity(&self) -> Vector3<f64> {
         self.motion.body.angular_velocity
     }
 
     /// Radius of a sphere around the geometric centre that holds the object [m].
-    #[must_use]
     pub fn bounding_radius(&self) -> f64 {
         self.shape.bounding_radius
     }
 
     /// Its convex hull, for a world of many bodies; `None` where it has none. One with more than 64 directions of edges, of which a
     /// step there would have to ask each pair, is replaced by that of its outermost corners.
-    #[must_use]
     pub fn hull(&self) -> Option<Hull> {
         self.shape.hull()
     }

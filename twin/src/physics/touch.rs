@@ -12,7 +12,6 @@ use nalgebra::{Isometry3, Point3, Vector3};
 pub struct Capsule {
     /// Flange to the far end of the segment: tool length minus radius.
     pub segment: f64,
-    /// Radius.
     pub radius: f64,
 }
 
@@ -49,14 +48,12 @@ struct Approach<'a> {
 
 impl TableObject {
     /// Where the tool touches the object deepest or comes nearest, for a flange at `base_from_flange`.
-    #[must_use]
     pub fn touch(&self, tool: &Capsule, base_from_flange: &Isometry3<f64>) -> Touch {
         let approach = Approach::new(self, tool, base_from_flange);
         approach.at(approach.nearest())
     }
 
     /// The two ends of the line along which tool and object touch, the flange's side first.
-    #[must_use]
     pub fn touches(&self, tool: &Capsule, base_from_flange: &Isometry3<f64>) -> [Touch; 2] {
         let approach = Approach::new(self, tool, base_from_flange);
         let nearest = approach.nearest();

@@ -23,7 +23,6 @@ pub(super) struct Tumbling {
     pub(super) mass: f64,
     /// Inertia about the centre of mass, object axes [kg m²].
     pub(super) inertia: Matrix3<f64>,
-    /// Its inverse.
     pub(super) inverse_inertia: Matrix3<f64>,
     /// Height of the table [m]; `None`: there is none.
     pub(super) table_height: Option<f64>,

@@ -21,7 +21,6 @@ pub struct Labelled {
 
 /// Parts a scan. A splat belongs to the robot when its surface is nearer than `reach` [m] and it does not lie on or below
 /// `table` [m above the base].
-#[must_use]
 pub fn label(
     scan: &SplatCloud,
     base_from_scan: &Similarity3<f64>,

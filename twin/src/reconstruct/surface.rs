@@ -10,7 +10,6 @@ const AREA: f64 = 25e-6;
 /// Points on the robot at some joint positions, base frame [m].
 #[derive(Debug, Clone, Default)]
 pub struct SurfacePoints {
-    /// Where.
     pub points: Vec<Point3<f64>>,
     /// Outward, length 1.
     pub normals: Vec<Vector3<f64>>,
@@ -20,7 +19,6 @@ pub struct SurfacePoints {
 
 impl SurfacePoints {
     /// The surface of the links that `wanted` names, at joint positions `q` [rad].
-    #[must_use]
     pub fn new(robot: &RobotSurface, q: &Joints, wanted: impl Fn(usize) -> bool) -> Self {
         let mut surface = Self::default();
         let links = robot.links();

@@ -42,7 +42,6 @@ pub struct Beside {
 
 impl LiveView {
     /// A view, and how long after its exposure a picture arrives [s].
-    #[must_use]
     pub fn new(view: TwinView, latency: f64) -> Self {
         let others = vec![None; view.names().len().saturating_sub(1)];
         Self { view, latency_ns: (latency * 1e9) as u64, moments: VecDeque::with_capacity(REMEMBERED), others }

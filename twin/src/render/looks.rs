@@ -38,7 +38,6 @@ pub(crate) fn table_top(height: f32) -> Mesh {
 pub(crate) struct DrawnBody {
     /// Empty where the cell has one object without a name.
     pub(crate) name: ObjectName,
-    /// Its surface.
     pub(crate) mesh: Mesh,
     /// Place of its object among those of the cell.
     pub(crate) object: usize,

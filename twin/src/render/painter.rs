@@ -9,7 +9,6 @@ use splat::{Body, Canvas, Lens, Picture, Shape, SplatCloud, Surroundings};
 /// What a body looks like, kept by a [`Painter`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum Model {
-    /// Splats.
     Splats(SplatCloud),
     /// A closed mesh of one colour.
     Mesh(Mesh),
@@ -133,14 +132,11 @@ impl Painter {
         }
     }
 
-    /// Who draws.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Why the processor draws although a device might have.
-    #[must_use]
     pub fn note(&self) -> Option<&str> {
         self.note.as_deref()
     }

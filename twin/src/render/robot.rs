@@ -17,7 +17,6 @@ const FINGERS: f64 = 0.0584;
 /// What is mounted at the flange beside the tool of cell.toml.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Hand {
-    /// Nothing.
     None,
     /// The Franka Hand, its fingers this far apart [m].
     Franka {
@@ -95,19 +94,16 @@ impl RobotSurface {
     }
 
     /// The parts, each in its own frame.
-    #[must_use]
     pub fn parts(&self) -> &[Mesh] {
         &self.parts
     }
 
     /// True when the parts are the manufacturer's shapes, false for capsules along the links.
-    #[must_use]
     pub fn is_measured(&self) -> bool {
         self.measured
     }
 
     /// For every part the number of the link it moves with: 0 the base, 1 behind the first joint, `dof + 1` the flange.
-    #[must_use]
     pub fn links(&self) -> Vec<usize> {
         let flange = self.outline.model().dof() + 1;
         let link = |body: Body| match body {
@@ -148,7 +144,6 @@ impl RobotSurface {
 
     /// Frame of a link in the base at joint positions `q` [rad], by its number as in [`Self::links`]; behind the last joint
     /// that of the Franka Hand.
-    #[must_use]
     pub fn base_from_link(&self, q: &Joints, link: usize) -> Isometry3<f64> {
         match link {
             0 => Isometry3::identity(),
@@ -158,7 +153,6 @@ impl RobotSurface {
     }
 
     /// The arm's model.
-    #[must_use]
     pub fn model(&self) -> &ArmModel {
         self.outline.model()
     }

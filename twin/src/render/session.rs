@@ -100,19 +100,15 @@ impl TwinView {
     }
 
     /// Columns and rows.
-    #[must_use]
     pub fn size(&self) -> [usize; 2] {
         self.size
     }
 
     /// What is odd about the splats, one sentence each.
-    #[must_use]
     pub fn remarks(&self) -> &[String] {
         &self.remarks
     }
 
-    /// Who draws.
-    #[must_use]
     pub fn painter(&self) -> &Painter {
         self.shown.painter()
     }
@@ -136,7 +132,6 @@ impl TwinView {
     }
 
     /// Names of the objects in the order in which they are drawn: the one in question first; empty for one without a name.
-    #[must_use]
     pub fn names(&self) -> &[ObjectName] {
         &self.names
     }
@@ -149,7 +144,6 @@ fn joints(q: &[f64]) -> Joints {
 }
 
 /// Real, twin and their difference side by side: columns, rows and pixels.
-#[must_use]
 pub fn beside(size: [usize; 2], real: &[u8], twin: &[u8]) -> (u32, u32, Vec<u8>) {
     let row = size[0] * 3;
     let mut out = Vec::with_capacity(3 * row * size[1]);

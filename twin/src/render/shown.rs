@@ -17,7 +17,6 @@ pub(crate) struct ScannedLink {
     pub(crate) link: usize,
     /// The scan's frame in the link's.
     pub(crate) link_from_scan: Isometry3<f64>,
-    /// Its splats.
     pub(crate) splats: SplatCloud,
 }
 
@@ -70,7 +69,6 @@ impl Shown {
         Ok(Self { painter: Painter::new(drawer, models, lens, size)?, places })
     }
 
-    /// Who draws.
     pub(crate) fn painter(&self) -> &Painter {
         &self.painter
     }

@@ -49,7 +49,6 @@ pub enum ReplayError {
     /// The object's mesh.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
-    /// The cell.
     #[error(transparent)]
     Cell(#[from] SimError),
     /// The clip's kind asks for an arm.
@@ -95,19 +94,16 @@ impl Replayer {
     }
 
     /// What is known about the cell.
-    #[must_use]
     pub fn cell(&self) -> &Cell {
         &self.cell
     }
 
     /// The identified parameters in force.
-    #[must_use]
     pub fn theta(&self) -> Option<&Theta> {
         self.theta.as_ref()
     }
 
     /// Points on the object's surface, where there is an object.
-    #[must_use]
     pub fn surface(&self) -> Option<&SurfacePoints> {
         self.object.as_ref().map(|(_, surface)| surface)
     }

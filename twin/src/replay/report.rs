@@ -24,7 +24,6 @@ pub struct Gap {
 pub struct ClipGap {
     /// Name of the clip's file.
     pub file: String,
-    /// The figures.
     #[serde(flatten)]
     pub gap: Gap,
     /// Where the recording comes from, as far as it says.
@@ -71,7 +70,6 @@ impl SessionGap {
     }
 
     /// Why the first simulation that was asked for could not be written, if one could not.
-    #[must_use]
     pub fn unwritten(&self) -> Option<&str> {
         self.failed.iter().find(|failure| failure.unwritten).map(|failure| failure.error.as_str())
     }

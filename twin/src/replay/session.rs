@@ -16,7 +16,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// How a session is replayed.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// Identified parameters.
     pub theta: Option<Theta>,
     /// Where simulated clips go: a file for a single clip, else a folder.
     pub out: Option<PathBuf>,

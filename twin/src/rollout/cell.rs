@@ -105,7 +105,6 @@ impl CellRollout {
     }
 
     /// The whole state now. Allocates; [`CellRollout::checkpoint_into`] does not.
-    #[must_use]
     pub fn checkpoint(&self) -> Checkpoint {
         Checkpoint { cell: self.cell.state(), camera: self.camera }
     }
@@ -262,39 +261,33 @@ impl CellRollout {
     }
 
     /// When tool and object touched since the object was set.
-    #[must_use]
     pub fn contact(&self) -> Option<ContactSpan> {
         let (start_ns, end_ns) = (self.cell.first_contact_ns()?, self.cell.last_contact_ns()?);
         Some(ContactSpan { start_ns, end_ns })
     }
 
     /// The present [ns].
-    #[must_use]
     pub fn now_ns(&self) -> u64 {
         self.cell.time_ns()
     }
 
     /// What the arm's sensors read now, without noise.
-    #[must_use]
     pub fn reading(&self) -> Reading {
         self.cell.reading()
     }
 
     /// The object now; `None` where there is none or it takes no part.
-    #[must_use]
     pub fn object(&self) -> Option<ObjectState> {
         let (velocity, angular_velocity) = self.cell.object_velocity()?;
         Some(ObjectState { pose: self.cell.object()?, velocity, angular_velocity })
     }
 
     /// The arm alone under the parameters in force, for [`ArmRollout::start_state`] and runs without an object.
-    #[must_use]
     pub fn arm(&self) -> Option<ArmRollout<'_>> {
         Some(self.cell.plant()?.rollout())
     }
 
     /// The simulated cell itself.
-    #[must_use]
     pub fn cell(&self) -> &SimCell {
         &self.cell
     }

@@ -27,8 +27,6 @@ pub struct ObjectState {
 }
 
 impl ObjectState {
-    /// At rest.
-    #[must_use]
     pub fn at_rest(pose: Pose<Base, Object>) -> Self {
         Self { pose, velocity: Vector3::zeros(), angular_velocity: Vector3::zeros() }
     }

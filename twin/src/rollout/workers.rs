@@ -27,7 +27,6 @@ impl<W: Clone + Send> Workers<W> {
     }
 
     /// Number of threads.
-    #[must_use]
     pub fn threads(&self) -> usize {
         self.workers.len()
     }

@@ -57,7 +57,6 @@ impl ArmOutline {
     }
 
     /// The capsules, from base to tool.
-    #[must_use]
     pub fn parts(&self) -> &[Part] {
         &self.parts
     }
@@ -79,7 +78,6 @@ impl ArmOutline {
     }
 
     /// The arm's model.
-    #[must_use]
     pub fn model(&self) -> &ArmModel {
         &self.model
     }

@@ -13,7 +13,6 @@ const SIDES: u32 = 24;
 /// Steps over a joint's range in which its highest place is looked for.
 const STEPS: u32 = 16;
 
-/// One body.
 #[derive(Debug, Clone)]
 pub struct CellBody {
     /// The object's name, or `NAME_LINK`; empty for the one object of a cell that names none.
@@ -119,7 +118,6 @@ fn surface(form: &UrdfForm, folder: &Path) -> Result<ObjectShape, MeshFileError>
 }
 
 /// Where a link's joint starts [rad or m]: where the object's block says, else at 0 or the limit nearest to it.
-#[must_use]
 pub fn start_of(object: &Object, link: &UrdfBody) -> f64 {
     let of = |joint: &crate::arm::UrdfJoint| {
         let [low, high] = joint.limits;
@@ -129,7 +127,6 @@ pub fn start_of(object: &Object, link: &UrdfBody) -> f64 {
 }
 
 /// Poses of an object's bodies in its root, each joint where `position` has it [rad or m].
-#[must_use]
 pub fn poses_in_root(own: &[&CellBody], position: impl Fn(&UrdfBody) -> f64) -> Vec<Isometry3<f64>> {
     let mut poses: Vec<Isometry3<f64>> = Vec::new();
     for body in own {
@@ -177,7 +174,6 @@ fn heights(own: &[&CellBody], poses: &[Isometry3<f64>]) -> [f64; 2] {
 
 impl CellBody {
     /// Its whole surface in the body's axes.
-    #[must_use]
     pub fn surface(&self) -> ObjectShape {
         if let [(at, shape)] = &self.pieces[..]
             && *at == Isometry3::identity()

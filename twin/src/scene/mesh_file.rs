@@ -26,7 +26,6 @@ pub enum MeshFileError {
     /// Not what its name says, or empty.
     #[error("{}: {what}; use a triangulated obj, stl or ply in metres", path.display())]
     Content {
-        /// The file.
         path: PathBuf,
         /// What is wrong.
         what: String,

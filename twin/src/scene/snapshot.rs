@@ -24,7 +24,6 @@ pub struct SceneSnapshot {
 
 impl SceneSnapshot {
     /// Where the body of this name is; an empty name stands for the first object.
-    #[must_use]
     pub fn of(&self, name: &ObjectName) -> Option<Pose<Base, Object>> {
         match name.is_empty() {
             true => self.object,
@@ -68,13 +67,11 @@ impl NamedPoses {
     }
 
     /// That of this name.
-    #[must_use]
     pub fn of(&self, name: &ObjectName) -> Option<Pose<Base, Object>> {
         self.all().iter().find(|(own, _)| own == name).map(|(_, pose)| *pose)
     }
 
     /// All, in the order of cell.toml.
-    #[must_use]
     pub fn all(&self) -> &[(ObjectName, Pose<Base, Object>)] {
         &self.poses[..self.count]
     }

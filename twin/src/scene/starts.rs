@@ -9,7 +9,6 @@ use shared_mem::cell::{Cell, Object};
 const BESIDE: f64 = 0.05;
 
 /// Pose of each object of a cell whose table has the height `table` [m]; of one that moves in itself that of its root.
-#[must_use]
 pub fn starts(cell: &Cell, bodies: &[CellBody], table: f64) -> Vec<Isometry3<f64>> {
     let mut before: Option<([f64; 2], f64)> = None;
     let start = |(number, object): (usize, &Object)| {
@@ -41,7 +40,6 @@ fn extent(object: &Object, number: usize, bodies: &[CellBody]) -> (f64, f64) {
 }
 
 /// Pose of each body at the start, in the order of `bodies`.
-#[must_use]
 pub fn body_starts(cell: &Cell, bodies: &[CellBody], table: f64) -> Vec<Isometry3<f64>> {
     let mut poses = Vec::with_capacity(bodies.len());
     for (number, (object, start)) in cell.objects.iter().zip(starts(cell, bodies, table)).enumerate() {
@@ -53,7 +51,6 @@ pub fn body_starts(cell: &Cell, bodies: &[CellBody], table: f64) -> Vec<Isometry
 }
 
 /// Where a joint is whose parent and link have these poses [rad or m].
-#[must_use]
 pub fn joint_position(joint: &UrdfJoint, parent: &Isometry3<f64>, link: &Isometry3<f64>) -> f64 {
     let moved = (parent * joint.at).inv_mul(link);
     if joint.slides { joint.axis.dot(&moved.translation.vector) } else { joint.axis.dot(&moved.rotation.scaled_axis()) }

@@ -20,7 +20,6 @@ use shared_mem::msg::image::{CameraInfo, ImageHeader, PixelEncoding, StampDomain
 use splat::{Lens, Picture, read_links};
 use std::path::Path;
 
-/// The camera.
 pub struct SimCamera {
     /// With the pose that it is said to have, of a camera that the arm holds in its last picture.
     settings: Camera,
@@ -85,14 +84,12 @@ impl SimCamera {
 
     /// The same camera held by the arm; `flange_from_camera`: its optical frame in the flange's. A camera whose cell has no robot
     /// stays where it is.
-    #[must_use]
     pub fn held(self, flange_from_camera: Isometry3<f64>) -> Self {
         Self { flange_from_camera: Some(flange_from_camera), ..self }
     }
 
     /// The same camera under effects that nobody is told: it stands elsewhere than [`Self::info`] says, and its pictures
     /// are older than their stamps. What is a tracker's own ([`CameraEffects::of_the_tracker`]) is in no picture.
-    #[must_use]
     pub fn with_effects(self, effects: &CameraEffects) -> Self {
         let misplaced = effects.misplaced().cast::<f32>();
         let camera_from_base = self.camera_from_base * misplaced;
@@ -130,25 +127,21 @@ impl SimCamera {
     }
 
     /// Columns and rows of its pictures.
-    #[must_use]
     pub fn size(&self) -> [usize; 2] {
         [self.settings.width, self.settings.height].map(|pixels| pixels as usize)
     }
 
     /// What is odd about the splats, one sentence each.
-    #[must_use]
     pub fn remarks(&self) -> &[String] {
         &self.remarks
     }
 
     /// Bytes of a colour picture.
-    #[must_use]
     pub fn color_bytes(&self) -> usize {
         self.raster.color().len() * 3
     }
 
     /// Bytes of a depth picture.
-    #[must_use]
     pub fn depth_bytes(&self) -> usize {
         self.raster.color().len() * 2
     }
@@ -209,7 +202,6 @@ impl SimCamera {
     }
 
     /// How this camera projects and where it stands, or stood in its last picture where the arm holds it. `stamp_ns` is the host's to set.
-    #[must_use]
     pub fn info(&self) -> CameraInfo {
         let pinhole = self.settings.pinhole();
         CameraInfo {

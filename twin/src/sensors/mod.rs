@@ -11,7 +11,6 @@ pub mod wrench;
 const CAMERA_EPOCH_NS: u64 = 86_400_123_456_789;
 
 /// The camera's own stamp of a moment of the simulation [ns].
-#[must_use]
 pub fn camera_clock_ns(time_ns: u64) -> u64 {
     CAMERA_EPOCH_NS + time_ns
 }

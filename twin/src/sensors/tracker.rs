@@ -16,7 +16,6 @@ use std::collections::VecDeque;
 const OF_THE_FIRST: u64 = 3;
 const OF_OTHERS: u64 = 100;
 
-/// The tracker.
 #[derive(Debug, Clone)]
 pub struct SimTracker {
     period_ns: u64,
@@ -33,13 +32,11 @@ pub struct SimTracker {
 
 impl SimTracker {
     /// The tracker of a cell: rate and latency of its camera, noise of its object. Without `[camera]` those of a D455 at 30 Hz.
-    #[must_use]
     pub fn new(cell: &Cell) -> Self {
         Self::drawing(cell, OF_THE_FIRST)
     }
 
     /// The tracker of the cell's body of this number, which belongs to the object in question: its noise is its own.
-    #[must_use]
     pub fn of_body(cell: &Cell, number: usize) -> Self {
         Self::drawing(cell, if number == 0 { OF_THE_FIRST } else { OF_OTHERS + number as u64 })
     }
@@ -61,7 +58,6 @@ impl SimTracker {
     }
 
     /// The same tracker under effects that nobody is told: its poses are then older than their stamps say, or elsewhere.
-    #[must_use]
     pub fn with_effects(self, effects: CameraEffects) -> Self {
         Self { effects, ..self }
     }

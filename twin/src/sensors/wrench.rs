@@ -29,7 +29,6 @@ pub struct SimWrench {
 
 impl SimWrench {
     /// The sensor of a cell; as if it had the usual one where cell.toml has no `[wrench]`.
-    #[must_use]
     pub fn new(cell: &Cell) -> Self {
         let described = cell.wrench.unwrap_or_default();
         let normal = |sigma: f64| Normal::new(0.0, sigma).unwrap_or_else(|_| Normal::new(0.0, 0.0).expect("zero"));

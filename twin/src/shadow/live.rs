@@ -38,7 +38,6 @@ pub trait Watcher {
 /// The shadow stopped because it cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
     /// The bridge drives another arm.

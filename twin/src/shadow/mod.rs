@@ -193,14 +193,12 @@ impl Shadow {
     }
 
     /// Name of an object by its number; empty for one without.
-    #[must_use]
     pub fn name(&self, number: usize) -> ObjectName {
         self.scene.names().get(number).copied().unwrap_or_default()
     }
 
     /// An object in the twin when the tracker saw it last, and how far the two were apart; `None` for one without a name or that was
     /// not seen. `stamp_ns` is left for the sender.
-    #[must_use]
     pub fn twin_object(&self, number: usize) -> Option<TwinObject> {
         let (mirror, name) = (self.objects.get(number)?, self.name(number));
         let (mirrors_ns, pose) = mirror.pictured().filter(|_| !name.is_empty())?;
@@ -216,7 +214,6 @@ impl Shadow {
     }
 
     /// Figures since the twin was made.
-    #[must_use]
     pub fn summary(&self) -> Summary {
         Summary {
             cycles: self.cycles,

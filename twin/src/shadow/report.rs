@@ -22,7 +22,6 @@ impl Ages {
     }
 
     /// Age that a share of the states did not exceed, 0 to 1 [µs]; `None` without states.
-    #[must_use]
     pub fn quantile_us(&self, share: f64) -> Option<f64> {
         (!self.nanoseconds.is_empty()).then(|| self.nanoseconds.value_at_quantile(share) as f64 * 1e-3)
     }
@@ -38,7 +37,6 @@ impl Ages {
 /// Figures of a run.
 #[derive(Debug, Clone)]
 pub struct Summary {
-    /// States mirrored.
     pub cycles: u64,
     /// States thrown away: unread because the twin fell behind, or not finite.
     pub dropped: u64,
@@ -57,7 +55,6 @@ pub struct Summary {
 impl Summary {
     /// The answer of `twin shadow --json`. `busy_s` is the time the twin's thread computed: simulated time over it is
     /// how much faster than the robot the twin could have gone.
-    #[must_use]
     pub fn json(&self, busy_s: f64) -> Value {
         let gap = |(name, gap): &(String, Option<(f64, f64)>)| {
             let gap = json!({ "add_m": gap.map(|(add, _)| add), "add_s_m": gap.map(|(_, add_s)| add_s) });
@@ -80,7 +77,6 @@ impl Summary {
     }
 
     /// The same for people; `None` where nothing was mirrored.
-    #[must_use]
     pub fn text(&self, busy_s: f64) -> Option<String> {
         let worst = self.joint_rms.as_ref()?.iter().copied().fold(0.0, f64::max);
         let seen = |name: &str, gap: &Option<(f64, f64)>| match gap {

@@ -9,10 +9,8 @@ use crate::world::PlanError;
 /// No cell can be simulated from what was given.
 #[derive(Debug, thiserror::Error)]
 pub enum SimError {
-    /// The arm.
     #[error(transparent)]
     Arm(#[from] ModelError),
-    /// Its controller.
     #[error(transparent)]
     Gains(#[from] GainError),
     /// The object's mesh file.
@@ -30,7 +28,6 @@ pub enum SimError {
     /// The start pose does not fit the arm.
     #[error("`simulation.q` holds {given} numbers; this arm has {dof} joints: give one for each, or leave it out")]
     StartPose {
-        /// Numbers given.
         given: usize,
         /// Joints of the arm.
         dof: usize,
@@ -38,7 +35,6 @@ pub enum SimError {
     /// One of several objects.
     #[error("object `{name}`: {source}")]
     Of {
-        /// Its name.
         name: String,
         /// What is wrong with it.
         source: Box<Self>,
@@ -46,7 +42,6 @@ pub enum SimError {
     /// An object that cannot be one of many bodies.
     #[error("object `{name}`: {what}")]
     Body {
-        /// Its name.
         name: String,
         /// What is wrong with it.
         what: String,
@@ -58,7 +53,6 @@ pub enum SimError {
     Overlap {
         /// One of them.
         first: String,
-        /// The other.
         second: String,
     },
     /// The world of many bodies.

@@ -16,7 +16,6 @@ pub(super) struct JointNoise {
 
 impl JointNoise {
     /// Noise of a cell's encoders; none where cell.toml gives none.
-    #[must_use]
     pub(super) fn new(cell: &Cell) -> Self {
         let normal =
             |sigma: f64| Normal::new(0.0, sigma.abs()).unwrap_or_else(|_| Normal::new(0.0, 0.0).expect("zero"));

@@ -199,80 +199,67 @@ impl SimCell {
     }
 
     /// Simulated time [ns], from 0 when the cell was made.
-    #[must_use]
     pub fn time_ns(&self) -> u64 {
         self.time_ns
     }
 
     /// True joint positions [rad]; zeros without an arm.
-    #[must_use]
     pub fn q(&self) -> Joints {
         self.arm.as_ref().map_or([0.0; 8], |arm| arm.state().q)
     }
 
     /// True joint velocities [rad/s]; zeros without an arm.
-    #[must_use]
     pub fn dq(&self) -> Joints {
         self.arm.as_ref().map_or([0.0; 8], |arm| arm.state().dq)
     }
 
     /// What the arm's encoders would read without noise: not the true positions where an effect parts the two.
-    #[must_use]
     pub fn joint_reading(&self) -> JointState {
         self.reading().state
     }
 
     /// What all of the arm's sensors would read without noise; zeros without an arm.
-    #[must_use]
     pub fn reading(&self) -> Reading {
         self.arm.as_ref().map(SimArm::reading).unwrap_or_default()
     }
 
     /// Torque behind the gear, gravity included, mean over the last period [N m]; zeros without an arm.
-    #[must_use]
     pub fn tau_J(&self) -> Joints {
         self.reading().tau_J
     }
 
     /// The command in force: what an arm goes on with that is told nothing new. No torque without an arm.
-    #[must_use]
     pub fn command(&self) -> Drive {
         self.arm.as_ref().map_or(Drive::Torque { tau_J_d: [0.0; 8] }, SimArm::command)
     }
 
     /// The arm with its controller and effects, where there is an arm.
-    #[must_use]
     pub fn plant(&self) -> Option<&Plant> {
         self.arm.as_ref().map(SimArm::plant)
     }
 
     /// The arm's model, where there is an arm.
-    #[must_use]
     pub fn arm_model(&self) -> Option<&ArmModel> {
         self.arm.as_ref().map(SimArm::model)
     }
 
     /// The object's geometric centre, where there is an object.
-    #[must_use]
     pub fn object(&self) -> Option<Pose<Base, Object>> {
         self.object.as_ref().filter(|_| self.takes_part.object).map(TableObject::pose)
     }
 
     /// The object's velocity at its geometric centre [m/s] and its angular velocity [rad/s].
-    #[must_use]
     pub fn object_velocity(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let object = self.object.as_ref().filter(|_| self.takes_part.object)?;
         Some((object.centre_velocity(), object.angular_velocity()))
     }
 
     /// Effects on what a tracker reports about the object: for the [`crate::sensors::tracker::SimTracker`] of this cell.
-    #[must_use]
     pub fn camera_effects(&self) -> CameraEffects {
         self.camera
     }
 
     /// Whether tool and object may touch within the next period.
-    #[must_use]
     pub fn may_touch(&self) -> bool {
         match (&self.arm, &self.object) {
             (Some(arm), Some(object)) if self.takes_part.arm && self.takes_part.object => {
@@ -283,13 +270,11 @@ impl SimCell {
     }
 
     /// Whether the object stands still and does so until something touches it. True where there is none.
-    #[must_use]
     pub fn object_rests(&self) -> bool {
         self.object.as_ref().filter(|_| self.takes_part.object).is_none_or(TableObject::rests)
     }
 
     /// Gap between tool and object if the arm were at `q` [m]; without bound where one of them takes no part.
-    #[must_use]
     pub fn gap_at(&self, q: &Joints) -> f64 {
         match (&self.arm, &self.object) {
             (Some(arm), Some(object)) if self.takes_part.arm && self.takes_part.object => {
@@ -300,26 +285,22 @@ impl SimCell {
     }
 
     /// Normal force between tool and object, mean over the last period [N].
-    #[must_use]
     pub fn contact_force(&self) -> f64 {
         self.contact.record.mean_force
     }
 
     /// Force of the object on the tool [N] and its moment about the base's origin [N m], base frame, mean over the last
     /// period.
-    #[must_use]
     pub fn contact_wrench(&self) -> [Vector3<f64>; 2] {
         self.contact.record.on_tool
     }
 
     /// When tool and object touched first since the cell was made or the object was last set [ns of simulated time].
-    #[must_use]
     pub fn first_contact_ns(&self) -> Option<u64> {
         self.contact.record.span.map(|(first, _)| first)
     }
 
     /// When the last touch of tool and object ended, or the end of the last period if they touch still [ns of simulated time].
-    #[must_use]
     pub fn last_contact_ns(&self) -> Option<u64> {
         self.contact.record.span.map(|(_, last)| last)
     }
@@ -375,7 +356,6 @@ impl SimCell {
     }
 
     /// The cell as a camera sees it now.
-    #[must_use]
     pub fn snapshot(&self) -> SceneSnapshot {
         SceneSnapshot {
             time_ns: self.time_ns,

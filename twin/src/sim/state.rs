@@ -30,7 +30,6 @@ impl Clone for SimState {
 
 impl SimCell {
     /// What the cell does now, to go on from later.
-    #[must_use]
     pub fn state(&self) -> SimState {
         SimState {
             arm: self.arm.as_ref().map(|arm| arm.motion.clone()),

@@ -19,7 +19,6 @@ const HOUSING: f64 = 0.06;
 /// The first joint whose housing can come down to the table: those before it sit on the base.
 const FIRST_FREE: usize = 3;
 
-/// The table.
 #[derive(Debug, Clone)]
 pub(super) struct SolidTable {
     height: f64,

@@ -24,7 +24,6 @@ pub(super) struct ToolPath {
 
 /// The tool at one moment.
 pub(super) struct ToolMotion {
-    /// The flange.
     pub(super) pose: Isometry3<f64>,
     velocity: Vector3<f64>,
     angular_velocity: Vector3<f64>,

@@ -40,7 +40,6 @@ pub struct Solid<'a> {
 /// A body that stands with a face on the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footing {
-    /// Its sliding.
     pub slider: Slider,
     /// Orientation at yaw 0: the face lies flat.
     upright: UnitQuaternion<f64>,
@@ -70,7 +69,6 @@ pub const BASE: f64 = 1e-3;
 
 impl Footing {
     /// The footing of a body that lies flat on the table and hardly moves up or down; `None` when it does not stand.
-    #[must_use]
     pub fn find(
         solid: &Solid<'_>,
         body: &FreeBody,
@@ -106,7 +104,6 @@ impl Footing {
     }
 
     /// A body that stands with the orientation `upright` at yaw 0; `None` when nothing flat is below its centre of mass.
-    #[must_use]
     pub fn on(solid: &Solid<'_>, upright: UnitQuaternion<f64>, table_height: f64) -> Option<Self> {
         let turned = upright.to_rotation_matrix();
         let place = |p: &Point3<f64>| turned * (p.coords - solid.centre_of_mass);
@@ -125,7 +122,6 @@ impl Footing {
     }
 
     /// The standing body as a free one.
-    #[must_use]
     pub fn release(&self, state: &PlanarState) -> FreeBody {
         FreeBody {
             centre: Point3::new(state.position.x, state.position.y, self.table_height + self.slider.height),

@@ -23,10 +23,7 @@ pub trait SlidingFriction {
 
 /// The same everywhere, in all directions, at all speeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coulomb(
-    /// The coefficient.
-    pub f64,
-);
+pub struct Coulomb(pub f64);
 
 impl SlidingFriction for Coulomb {
     #[inline]

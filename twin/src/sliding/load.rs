@@ -17,7 +17,6 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 /// Force and moment about the centre of mass [N, N m], gravity included, the table's answer not.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {
-    /// Force.
     pub force: Vector3<f64>,
     /// Moment about the centre of mass.
     pub moment: Vector3<f64>,
@@ -25,13 +24,11 @@ pub struct Wrench {
 
 impl Wrench {
     /// Weight alone: `gravity` [m/s²] points down on a level table and leans on a tilted one.
-    #[must_use]
     pub fn weight(mass: f64, gravity: Vector3<f64>) -> Self {
         Self { force: gravity * mass, moment: Vector3::zeros() }
     }
 
     /// Adds a force at a place given from the centre of mass, world axes [N, m].
-    #[must_use]
     pub fn with_force(self, force: Vector3<f64>, lever: Vector3<f64>) -> Self {
         Self { force: self.force + force, moment: self.moment + lever.cross(&force) }
     }

@@ -115,7 +115,6 @@ impl Patch {
     }
 
     /// The same places at `reach` times their distance from the middle of an even pressure.
-    #[must_use]
     pub fn reaching(mut self, reach: f64) -> Self {
         let middle = self.places().map(|(point, share)| point * share).sum::<Vector2<f64>>();
         self.points[..self.count].iter_mut().for_each(|point| *point = middle + (*point - middle) * reach);
@@ -123,20 +122,17 @@ impl Patch {
     }
 
     /// Mean squared distance of an even pressure from its middle [m²].
-    #[must_use]
     pub fn gyration_squared(&self) -> f64 {
         let middle = self.places().map(|(point, share)| point * share).sum::<Vector2<f64>>();
         self.places().map(|(point, share)| share * (point - middle).norm_squared()).sum()
     }
 
     /// Number of places.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.count
     }
 
     /// Whether there is no place at all. Never: a patch spans an area.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }

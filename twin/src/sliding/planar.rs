@@ -17,13 +17,11 @@ pub struct PlanarState {
 
 impl PlanarState {
     /// At rest at a place.
-    #[must_use]
     pub fn at_rest(position: Vector2<f64>, yaw: f64) -> Self {
         Self { position, yaw, velocity: Vector2::zeros(), yaw_rate: 0.0 }
     }
 
     /// Whether nothing moves. Exact: the law sets the rates of a stopped body to zero.
-    #[must_use]
     pub fn is_at_rest(&self) -> bool {
         self.velocity == Vector2::zeros() && self.yaw_rate == 0.0
     }

@@ -20,7 +20,6 @@ pub struct Slider {
     pub yaw_inertia: f64,
     /// Centre of mass above the table [m].
     pub height: f64,
-    /// The base.
     pub patch: Patch,
 }
 
@@ -29,7 +28,6 @@ pub struct Slider {
 pub enum Ending {
     /// At rest, and the friction can hold what acts on the body.
     Rests,
-    /// In motion.
     Slides,
     /// The load would have to pull at an edge: the body lifts or tips. The state stands where that begins, `left`
     /// seconds before the end of the step.
@@ -79,7 +77,6 @@ impl Slider {
     }
 
     /// Rates of velocity and yaw rate of a moving body now, world axes; zeros at rest and where the body would lift.
-    #[must_use]
     pub fn rates(
         &self,
         state: &PlanarState,
@@ -104,7 +101,6 @@ impl Slider {
     }
 
     /// Kinetic energy of the planar motion [J].
-    #[must_use]
     pub fn kinetic_energy(&self, state: &PlanarState) -> f64 {
         0.5 * (self.mass * state.velocity.norm_squared() + self.yaw_inertia * state.yaw_rate * state.yaw_rate)
     }

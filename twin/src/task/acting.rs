@@ -197,13 +197,11 @@ impl Acting {
     }
 
     /// What is now.
-    #[must_use]
     pub fn now(&self) -> Option<&EpisodeMoment> {
         self.moments.last()
     }
 
     /// What the cameras show: as late as those of the task's cell.
-    #[must_use]
     pub fn seen(&self) -> Option<&EpisodeMoment> {
         let latency = self.task.cell.as_ref().map_or(0.0, |cell| cell.latency);
         let rows = (latency / (STEPS_A_ROW as f64 * STEP)).round() as usize;
@@ -212,7 +210,6 @@ impl Acting {
     }
 
     /// Whether it has come to its end: success, a fault, or the horizon.
-    #[must_use]
     pub fn is_over(&self) -> bool {
         self.fault.is_some() || self.is_success() || self.time() + 0.5 * STEP >= self.task.horizon
     }
@@ -222,13 +219,11 @@ impl Acting {
     }
 
     /// Simulated time since the start [s].
-    #[must_use]
     pub fn time(&self) -> f64 {
         self.course.done as f64 * STEP
     }
 
     /// What came of it so far.
-    #[must_use]
     pub fn end(&self) -> ActingEnd {
         let success = self.is_success() && self.fault.is_none();
         ActingEnd {
@@ -241,7 +236,6 @@ impl Acting {
     }
 
     /// All of it, for a clip.
-    #[must_use]
     pub fn recorded(self) -> Recorded {
         let end = self.end();
         let info = EpisodeInfo {

@@ -36,7 +36,6 @@ pub(super) struct Way {
 }
 
 impl Way {
-    /// At rest.
     pub(super) fn at_rest(q: Joints) -> Self {
         Self { q: Some(q), ..Self::default() }
     }

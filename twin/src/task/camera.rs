@@ -26,7 +26,6 @@ const COLOURS: [[u8; 3]; 8] = [
 /// A camera of a task, in the world: z forward, x right, y down; a pinhole with square pixels around the picture's middle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TaskCamera {
-    /// Name.
     pub name: String,
     /// Columns and rows.
     pub size: [u32; 2],
@@ -88,14 +87,11 @@ pub struct TaskView {
 }
 
 impl Task {
-    /// Its cameras.
-    #[must_use]
     pub fn cameras(&self) -> &[TaskCamera] {
         &self.cameras
     }
 
     /// All bodies and the arm as a camera of the task sees them.
-    #[must_use]
     pub fn view(&self, camera: &TaskCamera) -> TaskView {
         let [width, height] = camera.size;
         let middle = |pixels: u32| (pixels as f32 - 1.0) / 2.0;

@@ -15,7 +15,6 @@ pub(super) enum Condition {
 }
 
 impl Condition {
-    /// In words.
     pub(super) fn words(&self, bodies: &[BodyPlan]) -> String {
         let name = |body: usize| &bodies[body].name;
         match *self {

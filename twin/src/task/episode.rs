@@ -75,7 +75,6 @@ pub struct Episode {
     /// Joints of an arm that gives way, at the start and at the end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmEnd>,
-    /// Every body.
     pub bodies: Vec<BodyEnd>,
     /// Bodies that press on each other at the end, by name.
     pub contacts: Vec<[String; 2]>,
@@ -93,7 +92,6 @@ pub struct ArmEnd {
 /// A body at the start and at the end.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BodyEnd {
-    /// Name.
     pub name: String,
     /// Where it started.
     pub start: Place,
@@ -108,7 +106,6 @@ pub struct BodyEnd {
 pub struct Place {
     /// World [m].
     pub position: [f64; 3],
-    /// Quaternion.
     pub orientation_wxyz: [f64; 4],
     /// Of its joint, where it has one [rad or m].
     pub joint: Option<f64>,

@@ -95,43 +95,36 @@ impl Task {
     }
 
     /// Its name: that of its file, without the ending.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// What is to be done, in words.
-    #[must_use]
     pub fn instruction(&self) -> &str {
         &self.instruction
     }
 
     /// Names of the joints of the arm that carries a moved body; empty without one.
-    #[must_use]
     pub fn arm_joints(&self) -> &[String] {
         self.carrier.as_ref().map_or(&[], Carrier::joint_names)
     }
 
     /// The body whose drive opens and closes the gripper, by its place.
-    #[must_use]
     pub fn gripper_drive(&self) -> Option<usize> {
         self.gripper.as_ref().map(Gripper::drive)
     }
 
     /// What counts as success, in words.
-    #[must_use]
     pub fn conditions(&self) -> Vec<String> {
         self.conditions.iter().map(|condition| condition.words(&self.bodies)).collect()
     }
 
     /// Opening of the gripper when it is closed and when it is open [m]; `None` without one.
-    #[must_use]
     pub fn gripper_range(&self) -> Option<[f64; 2]> {
         self.gripper.as_ref()?.range(&self.bodies)
     }
 
     /// Whether it has fingers to open and close.
-    #[must_use]
     pub fn has_gripper(&self) -> bool {
         self.gripper.is_some()
     }
@@ -150,19 +143,16 @@ impl Task {
     }
 
     /// The text of its file.
-    #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
     /// Its bodies, in their order.
-    #[must_use]
     pub fn bodies(&self) -> &[BodyPlan] {
         &self.bodies
     }
 
     /// How long an episode takes at most [s].
-    #[must_use]
     pub fn horizon(&self) -> f64 {
         self.horizon
     }

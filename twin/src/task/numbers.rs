@@ -33,7 +33,6 @@ pub struct Signs {
 
 impl Numbers {
     /// Those of a task.
-    #[must_use]
     pub fn of(task: &Task) -> Self {
         let gripper = task.gripper_drive();
         let mut numbers = Self {
@@ -93,7 +92,6 @@ impl Numbers {
     }
 
     /// Names of the state's numbers, and of an action's.
-    #[must_use]
     pub fn state_names(&self) -> Vec<String> {
         let mut names = self.poses(&self.moved);
         names.extend(self.gripper.then(|| "gripper.width".to_owned()));
@@ -103,7 +101,6 @@ impl Numbers {
     }
 
     /// Names of the surroundings' numbers: free bodies, joints without a drive.
-    #[must_use]
     pub fn surroundings_names(&self) -> Vec<String> {
         let mut names = self.poses(&self.free);
         names.extend(self.passive.iter().map(|[_, body]| format!("{}.joint", self.bodies[*body])));
@@ -111,7 +108,6 @@ impl Numbers {
     }
 
     /// What is: moved bodies, gripper, driven joints, arm.
-    #[must_use]
     pub fn state(&self, row: &EpisodeMoment, signs: &mut Signs) -> Vec<f32> {
         signs.moved.resize(self.moved.len(), None);
         let mut state = Vec::new();
@@ -127,7 +123,6 @@ impl Numbers {
     }
 
     /// What is around: free bodies, joints without a drive.
-    #[must_use]
     pub fn surroundings(&self, row: &EpisodeMoment, signs: &mut Signs) -> Vec<f32> {
         signs.free.resize(self.free.len(), None);
         let mut around = Vec::new();
@@ -139,7 +134,6 @@ impl Numbers {
     }
 
     /// What is commanded at a moment, in the order of the state; `signs` are those of the state before it.
-    #[must_use]
     pub fn action(&self, next: &EpisodeMoment, signs: &Signs) -> Vec<f32> {
         let mut action = Vec::new();
         for (i, target) in next.targets.iter().enumerate() {

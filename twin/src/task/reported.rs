@@ -33,7 +33,6 @@ impl Task {
 
     /// What a robot reports as a row: the arm, what it carries, the gripper. Of other bodies nothing is known: they stand where the
     /// task file has them.
-    #[must_use]
     pub fn reported(&self, arm: &ArmState, gripper: Option<&GripperState>) -> EpisodeMoment {
         let carrier = self.carrier.as_ref();
         let pose = |body: usize| match (carrier, &self.bodies[body].hold) {

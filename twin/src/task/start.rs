@@ -35,7 +35,6 @@ pub enum StartError {
     Crowded {
         /// One of the two.
         first: String,
-        /// The other.
         second: String,
         /// How often it was tried, where there was a choice.
         drawings: String,

@@ -36,7 +36,6 @@ pub enum Jog {
         /// About x, y, z.
         about: [f64; 3],
     },
-    /// Single joints.
     Joints(Joints),
 }
 
@@ -212,26 +211,21 @@ impl Steered {
         self.moments.push(moment);
     }
 
-    /// Its seed.
-    #[must_use]
     pub fn seed(&self) -> u64 {
         self.seed
     }
 
     /// Simulated time since the start [s].
-    #[must_use]
     pub fn time(&self) -> f64 {
         self.course.done as f64 * STEP
     }
 
     /// Where the bodies are.
-    #[must_use]
     pub fn poses(&self) -> Vec<RigidPose> {
         (0..self.task.bodies.len()).map(|body| super::demonstration::rigid_pose(&self.world.pose(body))).collect()
     }
 
     /// Joint positions of the arm [rad].
-    #[must_use]
     pub fn joints(&self) -> Joints {
         let given_way =
             self.task.carrier.as_ref().and_then(|carrier| self.world.arm(carrier.body)).map(|state| state.q);
@@ -239,33 +233,28 @@ impl Steered {
     }
 
     /// Origin of the flange in the arm's base [m].
-    #[must_use]
     pub fn flange(&self) -> [f64; 3] {
         let carrier = self.task.carrier.as_ref();
         carrier.map_or([0.0; 3], |carrier| carrier.flange(&self.joints()).translation.vector.into())
     }
 
     /// Between the fingers [m], and whether they hold something; `None` without a gripper.
-    #[must_use]
     pub fn gripper(&self) -> Option<(f64, bool)> {
         let state = self.task.gripper.as_ref()?.state(&self.world, self.task.bodies.len())?;
         Some((state.width, state.grasped != 0))
     }
 
     /// Which of the conditions of success hold now, in the order of [`Task::conditions`].
-    #[must_use]
     pub fn holds(&self) -> Vec<bool> {
         self.task.conditions.iter().map(|condition| condition.holds(&self.world)).collect()
     }
 
     /// Whether all of them have held for as long as they have to.
-    #[must_use]
     pub fn is_success(&self) -> bool {
         self.course.is_success(self.task.hold)
     }
 
     /// Why the arm does not go where it is jogged, where it does not.
-    #[must_use]
     pub fn held_by(&self) -> Option<&'static str> {
         self.held_by
     }

@@ -42,7 +42,6 @@ pub(super) enum FingersEntry {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum EpisodeEntry {
-    /// Begins one.
     Start,
     /// Ends it and keeps it, success or not.
     Keep,

@@ -57,7 +57,6 @@ pub enum ServeError {
     /// The task, or where clips go.
     #[error(transparent)]
     Teleop(#[from] TeleopError),
-    /// The port.
     #[error("cannot listen on {at}: {source}; give another --port, or an address of this machine to --bind")]
     Listen {
         /// What was asked for.

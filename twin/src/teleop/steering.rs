@@ -25,16 +25,13 @@ const SEEDS: u64 = 100;
 /// Steering cannot begin or go on.
 #[derive(Debug, thiserror::Error)]
 pub enum TeleopError {
-    /// The task.
     #[error(transparent)]
     Steer(#[from] SteerError),
-    /// No picture.
     #[error("the task has no camera; give it a [[camera]] block (docs/tasks.md)")]
     NoCamera,
     /// Not that picture.
     #[error("the task has no camera `{wanted}`; it has: {there}")]
     OtherCamera {
-        /// Asked for.
         wanted: String,
         /// What there is.
         there: String,
@@ -70,7 +67,6 @@ pub struct Summary {
     pub discarded: u64,
     /// The seed of the one that was under way at the end.
     pub cut_short: Option<u64>,
-    /// Their clips.
     pub clips: Vec<PathBuf>,
 }
 

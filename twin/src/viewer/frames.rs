@@ -27,7 +27,6 @@ pub(super) const CAMERA: &str = "camera";
 const FLANGE: &str = "flange";
 const OBJECT: &str = "object";
 
-/// Their names.
 pub(super) struct Frames {
     base: String,
     /// Behind each joint; empty where the arm has no geometry.
@@ -41,7 +40,6 @@ impl Frames {
         Self { base: cell.base_frame().to_owned(), links }
     }
 
-    /// The base.
     pub(super) fn base(&self) -> &str {
         &self.base
     }
@@ -76,7 +74,6 @@ impl Frames {
         self.on_base(time, own(look, frame), place)
     }
 
-    /// The camera.
     pub(super) fn camera(&self, time: Timestamp, base_from_camera: &Isometry3<f64>) -> FrameTransforms {
         self.on_base(time, CAMERA.to_owned(), base_from_camera)
     }

@@ -82,19 +82,16 @@ pub struct Viewer {
 /// The live view cannot be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewerError {
-    /// The socket.
     #[error("cannot listen on {HOST}:{PORT}: {0}; stop the other viewer, or start without --viewer")]
     Listen(io::Error),
     /// The server behind it.
     #[error("the viewer's server cannot be started: {0}; start without --viewer")]
     Server(FoxgloveError),
-    /// A channel.
     #[error("cannot open a channel of the viewer: {0}; start without --viewer")]
     Channel(FoxgloveError),
     /// The arm to draw.
     #[error(transparent)]
     Arm(#[from] ModelError),
-    /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
 }
@@ -145,7 +142,6 @@ impl Viewer {
     }
 
     /// Where a person points Foxglove or Lichtblick.
-    #[must_use]
     pub fn address(&self) -> String {
         format!("ws://{}", self.front.address())
     }

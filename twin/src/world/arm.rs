@@ -29,7 +29,6 @@ pub struct ArmPlan {
 
 impl ArmPlan {
     /// Where the carried body starts, in the world.
-    #[must_use]
     pub fn body_at_start(&self) -> Isometry3<f64> {
         self.base * self.model.flange(&self.start).isometry() * self.flange_from_body
     }

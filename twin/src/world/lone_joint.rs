@@ -27,7 +27,6 @@ pub struct LoneJoint {
 impl LoneJoint {
     /// Of a part, in its link's frame, on a joint of a URDF, with the friction of the file; `parent` turns the frame of the link that
     /// carries it into one whose z points up.
-    #[must_use]
     pub fn new(joint: &UrdfJoint, part: &MassProperties, parent: &UnitQuaternion<f64>) -> Self {
         let axis = joint.axis.into_inner();
         let weight = (parent * joint.at.rotation).inverse() * Vector3::new(0.0, 0.0, -GRAVITY * part.mass);
@@ -42,14 +41,12 @@ impl LoneJoint {
     }
 
     /// Torque or force of the weight at a position [N m or N].
-    #[must_use]
     pub fn load(&self, position: f64) -> f64 {
         let [cosine, sine, constant] = self.load;
         cosine * position.cos() + sine * position.sin() + constant
     }
 
     /// Position and velocity some seconds later.
-    #[must_use]
     pub fn after(&self, (mut position, mut velocity): (f64, f64), seconds: f64) -> (f64, f64) {
         let steps = (seconds / STEP).ceil().max(1.0);
         let dt = seconds / steps;

@@ -196,7 +196,6 @@ impl World {
     }
 
     /// Where the joints of the arm that carries a body are [rad], and how fast [rad/s]; `None` where no arm does.
-    #[must_use]
     pub fn arm(&self, body: usize) -> Option<JointState> {
         let arm = self.trees.arm(body)?;
         Some(JointState { q: arm.joints(&self.trees.positions), dq: arm.joints(&self.trees.velocities) })
@@ -222,13 +221,11 @@ impl World {
     }
 
     /// Pose of a body's origin.
-    #[must_use]
     pub fn pose(&self, body: usize) -> Isometry3<f64> {
         *self.trees.pose(body)
     }
 
     /// Position of a body's joint [rad or m].
-    #[must_use]
     pub fn joint(&self, body: usize) -> Option<f64> {
         self.trees.freedom(body).map(|(freedom, ratio)| ratio * self.trees.positions[freedom])
     }
@@ -240,14 +237,12 @@ impl World {
     }
 
     /// Where a body's joint is commanded to go [rad or m]; `None` for one without a drive.
-    #[must_use]
     pub fn driven_to(&self, body: usize) -> Option<f64> {
         let rail = self.rails.iter().find(|rail| rail.body == body)?;
         rail.drive.map(|drive| drive.target)
     }
 
     /// Whether two bodies press on each other.
-    #[must_use]
     pub fn touch(&self, first: usize, second: usize) -> bool {
         self.pairs.iter().any(|pair| {
             let [a, b] = pair.pieces.map(|piece| self.pieces[piece].body);
@@ -256,14 +251,12 @@ impl World {
     }
 
     /// How fast the fastest point of a body moves, at most [m/s].
-    #[must_use]
     pub fn speed(&self, body: usize) -> f64 {
         let [velocity, spin] = self.trees.twist(body);
         velocity.norm() + spin.norm() * self.bodies[body].radius
     }
 
     /// Two bodies that overlap now, where no joint connects them.
-    #[must_use]
     pub fn overlap(&self) -> Option<[usize; 2]> {
         let overlapping = |pair: &&PiecePair| {
             let mut found_by = Search::NONE;
@@ -274,7 +267,6 @@ impl World {
     }
 
     /// How deep these bodies are in any that is held fast, at most [m]; 0 where they are in none.
-    #[must_use]
     pub fn enters_fixed(&self, bodies: &[usize]) -> f64 {
         let of = |carried: bool| {
             let wanted = move |piece: &usize| {

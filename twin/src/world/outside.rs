@@ -84,7 +84,6 @@ impl World {
     }
 
     /// How a body moves.
-    #[must_use]
     pub fn motion(&self, body: usize) -> BodyMotion {
         let (pose, [of_centre, spin]) = (*self.trees.pose(body), self.trees.twist(body));
         let lever = pose.rotation * self.trees.nodes[body].centre.coords;
@@ -92,7 +91,6 @@ impl World {
     }
 
     /// Whether any two of these bodies that may touch are nearer to each other than `within` [m].
-    #[must_use]
     pub fn any_near(&self, bodies: &Range<usize>, within: f64) -> bool {
         self.pairs.iter().any(|pair| {
             pair.pieces.iter().all(|piece| bodies.contains(&self.pieces[*piece].body))
@@ -110,7 +108,6 @@ impl World {
     }
 
     /// What touched a body within the last step did to it.
-    #[must_use]
     pub fn load_on(&self, body: usize) -> Load {
         let mut load = Load::default();
         for (pair, patch) in &self.patches {

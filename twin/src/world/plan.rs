@@ -11,7 +11,6 @@ const SIDES: usize = 24;
 /// One convex piece of a body.
 #[derive(Debug, Clone)]
 pub struct Piece {
-    /// Its shape.
     pub hull: Arc<Hull>,
     /// Where it is in the body.
     pub at: Isometry3<f64>,
@@ -51,7 +50,6 @@ pub enum Hold {
     Arm(Box<ArmPlan>),
     /// Nothing but contacts; where it starts.
     Free(Isometry3<f64>),
-    /// A joint.
     Joint(JointPlan),
 }
 
@@ -105,7 +103,6 @@ pub struct Drive {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("body `{body}`: `{key}`: {what}")]
 pub struct PlanError {
-    /// Which body.
     pub body: String,
     /// What of it, as it is called in a task file.
     pub key: &'static str,
@@ -115,7 +112,6 @@ pub struct PlanError {
 
 impl BodyPlan {
     /// A body of evenly spread mass.
-    #[must_use]
     pub fn homogeneous(name: &str, pieces: Vec<Piece>, mass: f64, hold: Hold) -> Self {
         let volume: f64 = pieces.iter().map(|piece| piece.hull.volume).sum();
         let centre = |piece: &Piece| (piece.at * piece.hull.centroid).coords;
@@ -131,7 +127,6 @@ impl BodyPlan {
     }
 
     /// The force of its joint's drive, where it has one [N or N m].
-    #[must_use]
     pub fn drive_force(&self) -> Option<f64> {
         match &self.hold {
             Hold::Joint(joint) => joint.drive.map(|drive| drive.force),
@@ -140,13 +135,11 @@ impl BodyPlan {
     }
 
     /// The same with a friction.
-    #[must_use]
     pub fn with_friction(self, friction: f64) -> Self {
         Self { friction, ..self }
     }
 
     /// The same in a world in which so many more bodies come before it and the one that carries it.
-    #[must_use]
     pub fn hanging(mut self, behind: usize) -> Self {
         if let Hold::Joint(JointPlan { parent: Some(parent), .. }) = &mut self.hold {
             *parent += behind;
@@ -191,14 +184,12 @@ impl BodyPlan {
 
 impl Piece {
     /// A piece whose axes are the body's.
-    #[must_use]
     pub fn new(hull: Hull, at: Isometry3<f64>) -> Self {
         Self { hull: Arc::new(hull), at }
     }
 }
 
 /// A box around the origin with edges of these lengths [m]; `None` where one has none.
-#[must_use]
 pub fn box_hull(size: [f64; 3]) -> Option<Hull> {
     let corners = (0..8).map(|i| {
         let side = |axis: usize| if i >> axis & 1 == 0 { -0.5 } else { 0.5 } * size[axis];
@@ -208,7 +199,6 @@ pub fn box_hull(size: [f64; 3]) -> Option<Hull> {
 }
 
 /// A cylinder around the origin along z, as a prism inside of it with faces across x and y [m]; `None` where it has no volume.
-#[must_use]
 pub fn cylinder_hull(radius: f64, length: f64) -> Option<Hull> {
     let corners = (0..2 * SIDES).map(|i| {
         let (sin, cos) = (((i / 2) as f64 + 0.5) * std::f64::consts::TAU / SIDES as f64).sin_cos();

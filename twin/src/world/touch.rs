@@ -34,7 +34,6 @@ pub(super) struct Search {
     is_close: bool,
 }
 
-/// One place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     /// In the middle between the two surfaces.

@@ -36,7 +36,6 @@ pub(super) struct Node {
     pub(super) mass: f64,
     pub(super) centre: Point3<f64>,
     pub(super) inertia: Matrix3<f64>,
-    /// Its inverse.
     pub(super) lightness: Matrix3<f64>,
 }
 
@@ -67,7 +66,6 @@ pub(super) struct Span {
     pub(super) bodies: usize,
 }
 
-/// All bodies.
 #[derive(Debug, Clone)]
 pub(super) struct Trees {
     pub(super) nodes: Vec<Node>,

@@ -13,7 +13,6 @@ const MOST: usize = 1_000_000;
 /// An element with what is in it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Element {
-    /// Its name.
     pub name: String,
     /// Its attributes, in their order.
     pub attributes: Vec<(String, String)>,
@@ -24,9 +23,7 @@ pub struct Element {
 /// Something in an element.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Node {
-    /// An element.
     Element(Element),
-    /// A comment.
     Comment(String),
     /// Text that is more than space.
     Text(String),
@@ -34,7 +31,6 @@ pub enum Node {
 
 impl Element {
     /// An element of this name with these attributes and nothing in it.
-    #[must_use]
     pub fn new(name: &str, attributes: &[(&str, String)]) -> Self {
         let attributes = attributes.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
         Self { name: name.to_owned(), attributes, nodes: Vec::new() }
@@ -128,7 +124,6 @@ impl Element {
     }
 
     /// The document whose root this is.
-    #[must_use]
     pub fn document(&self) -> String {
         let mut document = Document::new();
         self.write(&mut document);
@@ -154,8 +149,6 @@ impl Element {
         }
     }
 
-    /// An attribute.
-    #[must_use]
     pub fn get(&self, key: &str) -> Option<&str> {
         self.attributes.iter().find(|(known, _)| known == key).map(|(_, value)| value.as_str())
     }
@@ -203,7 +196,6 @@ impl Element {
     }
 
     /// It and all elements below it, each before what is in it.
-    #[must_use]
     pub fn all(&self) -> Vec<&Self> {
         let (mut found, mut open) = (Vec::new(), vec![self]);
         while let Some(element) = open.pop() {

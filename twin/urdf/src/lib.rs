@@ -39,10 +39,8 @@ pub struct Robot {
     pub joints: Vec<Joint>,
 }
 
-/// One body.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Link {
-    /// Its name.
     pub name: String,
     /// Its mass properties; all zero where the file gives none.
     pub inertial: Inertial,
@@ -66,18 +64,13 @@ pub struct Collision {
 /// A shape around the origin of its frame [m].
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
-    /// Edge lengths.
     Box([f64; 3]),
-    /// Along z.
     Cylinder {
-        /// Its radius.
         radius: f64,
-        /// Its length.
         length: f64,
     },
     /// Of this radius.
     Sphere(f64),
-    /// A file.
     Mesh {
         /// As it is named.
         file: String,
@@ -91,13 +84,11 @@ pub enum Shape {
 pub struct Inertial {
     /// The inertial frame in the link's; its origin is the centre of mass.
     pub origin: Pose,
-    /// The mass.
     pub mass: Mass,
     /// The inertia about the centre of mass, along the inertial frame's axes.
     pub inertia: Inertia,
 }
 
-/// A mass.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Mass {
     /// [kg]
@@ -116,7 +107,6 @@ pub struct Inertia {
     pub izz: f64,
 }
 
-/// Three numbers.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Vec3(pub [f64; 3]);
 
@@ -129,10 +119,8 @@ pub struct Pose {
     pub rpy: Vec3,
 }
 
-/// One joint.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Joint {
-    /// Its name.
     pub name: String,
     /// How it moves.
     pub joint_type: JointType,
@@ -146,9 +134,7 @@ pub struct Joint {
     pub friction: f64,
     /// Viscous friction [N m s/rad or N s/m]; 0 where the file gives none.
     pub damping: f64,
-    /// Its axis.
     pub axis: Axis,
-    /// Its limits.
     pub limit: JointLimit,
     /// The joint whose position it follows (`<mimic>`), if it does.
     pub mimicked: Option<String>,
@@ -173,14 +159,12 @@ pub enum JointType {
 /// A link, by name.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct LinkName {
-    /// The name.
     pub link: String,
 }
 
 /// The axis of a joint in the joint's frame, of any length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
-    /// Its direction.
     pub xyz: Vec3,
 }
 
@@ -194,13 +178,10 @@ impl Default for Axis {
 /// it is infinite.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct JointLimit {
-    /// Lowest position.
     pub lower: f64,
-    /// Highest position.
     pub upper: f64,
     /// Largest torque or force.
     pub effort: f64,
-    /// Largest speed.
     pub velocity: f64,
 }
 

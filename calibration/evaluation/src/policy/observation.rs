@@ -106,7 +106,6 @@ pub struct Seen<'a> {
 
 impl Seen<'_> {
     /// As a message; `signs` go on from the message before.
-    #[must_use]
     pub fn message(&self, keys: &Keys, signs: &mut Signs) -> Value {
         let mut message = Vec::new();
         let mut put = |key: &str, values: &[f32]| {

@@ -135,7 +135,6 @@ impl Onnx {
     }
 
     /// An answer that does not fit the task.
-    #[must_use]
     pub fn answer(&self, what: &dyn std::fmt::Display) -> OnnxError {
         OnnxError::Answer { path: self.path.clone(), what: what.to_string() }
     }

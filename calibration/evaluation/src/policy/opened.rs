@@ -28,7 +28,6 @@ pub enum PolicyError {
 
 impl PolicyError {
     /// Whether nothing went wrong but that the end was asked for.
-    #[must_use]
     pub fn is_interruption(&self) -> bool {
         matches!(self, Self::Served(ServedError::Interrupted) | Self::Onnx(OnnxError::Interrupted))
     }
@@ -68,7 +67,6 @@ impl Policy {
     }
 
     /// An answer that does not fit the task.
-    #[must_use]
     pub fn answer(&self, what: &dyn std::fmt::Display) -> PolicyError {
         match self {
             Self::Served(policy) => policy.answer(what).into(),

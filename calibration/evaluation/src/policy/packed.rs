@@ -43,7 +43,6 @@ pub(super) fn floats(shape: &[usize], values: &[f32]) -> Value {
 }
 
 /// The bytes of a message.
-#[must_use]
 pub fn pack(message: &Value) -> Vec<u8> {
     let mut bytes = Vec::new();
     // A vector takes whatever is written.

@@ -106,7 +106,6 @@ impl Served {
     }
 
     /// What the server says about itself.
-    #[must_use]
     pub fn metadata(&self) -> &Value {
         &self.metadata
     }
@@ -126,7 +125,6 @@ impl Served {
     }
 
     /// An answer that does not fit the task.
-    #[must_use]
     pub fn answer(&self, what: &dyn std::fmt::Display) -> ServedError {
         ServedError::Answer { address: self.address.clone(), what: what.to_string() }
     }

@@ -13,7 +13,6 @@ const LEAST: f64 = 0.2;
 const STREAM: u128 = 0x0061_6772_6565;
 
 /// Pearson's correlation; 1 where both differ from their means alike, NaN where one of them does not vary.
-#[must_use]
 pub fn pearson(first: &[f64], second: &[f64]) -> f64 {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let (a, b) = (mean(first), mean(second));
@@ -23,7 +22,6 @@ pub fn pearson(first: &[f64], second: &[f64]) -> f64 {
 }
 
 /// Mean over policies of the largest difference in `real` to a policy that `simulated` ranks the other way (SIMPLER, eq. 2).
-#[must_use]
 pub fn mean_maximum_rank_violation(simulated: &[f64], real: &[f64]) -> f64 {
     let largest = |i: usize| {
         let wrong = |j: &usize| (simulated[i] > simulated[*j]) != (real[i] > real[*j]);
@@ -62,7 +60,6 @@ pub struct Agreement {
 /// Trials scatter shares more widely than the policies differ, which lowers a correlation. So trials are drawn again from shares that
 /// are drawn in towards their mean by what scatter explains, and each correlation is divided by what scatter leaves of it
 /// (Spearman 1904); the interval is the middle part of what comes of that.
-#[must_use]
 pub fn agreement(cells: &[Cell], groups: &[usize], level: f64, seed: u64) -> Option<Agreement> {
     if cells.len() < 3 {
         return None;

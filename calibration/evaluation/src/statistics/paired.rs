@@ -33,13 +33,11 @@ impl Pairs {
     }
 
     /// How many.
-    #[must_use]
     pub fn count(&self) -> u64 {
         self.both + self.first_only + self.second_only + self.neither
     }
 
     /// McNemar's exact test: the chance of so one-sided a parting, if neither is better than the other. 1 without any parting.
-    #[must_use]
     pub fn p_value(&self) -> f64 {
         let apart = self.first_only + self.second_only;
         let fewer = self.first_only.min(self.second_only);
@@ -47,7 +45,6 @@ impl Pairs {
     }
 
     /// How much more often the first succeeds, with Newcombe's interval for pairs: `[value, low, high]`.
-    #[must_use]
     pub fn difference(&self, level: f64) -> [f64; 3] {
         let trials = self.count();
         let first = Share { successes: self.both + self.first_only, trials };

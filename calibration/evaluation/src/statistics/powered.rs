@@ -24,7 +24,6 @@ pub struct Powered {
 
 /// The estimate from `pairs` of one real and one simulated outcome from the same start, and `more` simulated outcomes of other
 /// starts; `None` without pairs.
-#[must_use]
 pub fn powered(pairs: &[[bool; 2]], more: &[bool], level: f64) -> Option<Powered> {
     let (n, others) = (pairs.len() as f64, more.len() as f64);
     if pairs.is_empty() {

@@ -13,7 +13,6 @@ pub struct Kruskal {
 }
 
 /// Kruskal and Wallis's test; `None` for less than two groups with something in them. Where all values are one, nothing differs.
-#[must_use]
 pub fn kruskal_wallis(groups: &[&[f64]]) -> Option<Kruskal> {
     let groups: Vec<&[f64]> = groups.iter().copied().filter(|group| !group.is_empty()).collect();
     if groups.len() < 2 {

@@ -22,13 +22,11 @@ impl Share {
     }
 
     /// The share; NaN without trials.
-    #[must_use]
     pub fn value(self) -> f64 {
         self.successes as f64 / self.trials as f64
     }
 
     /// Wilson's interval; from 0 to 1 without trials.
-    #[must_use]
     pub fn interval(self, level: f64) -> [f64; 2] {
         if self.trials == 0 {
             return [0.0, 1.0];
@@ -50,7 +48,6 @@ pub(super) fn wilson(share: f64, trials: f64, level: f64) -> [f64; 2] {
 }
 
 /// How much larger the first of two independent shares is, with Newcombe's interval: `[value, low, high]`.
-#[must_use]
 pub fn difference(first: Share, second: Share, level: f64) -> [f64; 3] {
     let (p, q) = (first.value(), second.value());
     let ([p_low, p_high], [q_low, q_high]) = (first.interval(level), second.interval(level));

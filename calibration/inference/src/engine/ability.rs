@@ -21,7 +21,6 @@ pub enum Quantity {
 
 impl Quantity {
     /// The one of a name of logs and messages; positions where there is none.
-    #[must_use]
     pub fn named(name: &str) -> Self {
         QUANTITIES.iter().find(|(known, _)| *known == name).map_or(Self::Position, |(_, quantity)| *quantity)
     }
@@ -97,13 +96,11 @@ impl Ability {
     }
 
     /// All of it as a text: results of one engine are not those of another.
-    #[must_use]
     pub fn print(&self) -> String {
         format!("{self:?}")
     }
 
     /// Whether it reports a quantity.
-    #[must_use]
     pub fn reports(&self, quantity: Quantity) -> bool {
         self.readings.contains(&quantity)
     }
@@ -114,7 +111,6 @@ impl Ability {
     }
 
     /// Whether it simulates an effect with all its parameters.
-    #[must_use]
     pub fn knows(&self, effect: &str) -> bool {
         let all = find(effect).map_or(&[][..], |effect| effect.parameters);
         self.effects.get(effect).is_some_and(|known| all.iter().all(|p| known.iter().any(|name| name == p.name)))
@@ -122,7 +118,6 @@ impl Ability {
 
     /// The part of parameters that it simulates itself, with what is a camera's: that acts on its answer. Other numbers of controller
     /// and object are those of `nominal`.
-    #[must_use]
     pub fn part(&self, theta: &Theta, nominal: &Theta) -> Theta {
         let mut part = theta.clone();
         let [stiffness, damping, friction, mass, centre_of_mass, tip_friction] = self.sets;

@@ -18,7 +18,6 @@ pub enum EngineError {
     Ended {
         /// As it was given.
         command: String,
-        /// How.
         status: ExitStatus,
         /// The last line it wrote to standard error, after a colon; empty where there is none.
         words: String,
@@ -30,7 +29,6 @@ pub enum EngineError {
     Silent {
         /// As it was given.
         command: String,
-        /// The limit.
         seconds: u64,
         /// As of [`EngineError::Ended`].
         words: String,
@@ -67,16 +65,12 @@ pub enum EngineError {
         "--engine simulates an arm and what it hits, and in {count} of these clips an object moves by itself (`kind = \"free_motion\"`); take \
          them out of cell.toml, or leave --engine out"
     )]
-    NoArm {
-        /// Such clips.
-        count: usize,
-    },
+    NoArm { count: usize },
     /// It says itself that it cannot go on.
     #[error("the engine `{command}`: {why}")]
     Refused {
         /// As it was given.
         command: String,
-        /// Its words.
         why: String,
     },
     /// The user asked for the end.

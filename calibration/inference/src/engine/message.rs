@@ -28,7 +28,6 @@ pub(super) struct Greeting<'a> {
 #[derive(Debug, Serialize)]
 pub(super) struct RollOut<'a> {
     pub(super) message: &'static str,
-    /// Joints.
     pub(super) dof: usize,
     /// Rows of commands from before the start.
     pub(super) before: usize,
@@ -50,7 +49,6 @@ pub(super) struct RollOut<'a> {
 /// An object that stands on the table when a roll-out begins. Its frame is its geometric centre.
 #[derive(Debug, Serialize)]
 pub(super) struct ObjectBlock<'a> {
-    /// Its numbers.
     #[serde(flatten)]
     pub(super) body: &'a ObjectBody,
     /// Where it stands, in the base frame [m].
@@ -91,10 +89,7 @@ pub(super) enum Reply {
     /// The states that were asked for.
     States,
     /// The engine has no answer for these parameters; others may do.
-    Impossible {
-        /// The reason.
-        why: String,
-    },
+    Impossible { why: String },
     /// The engine cannot go on at all.
     Error {
         /// The reason, and what to do.

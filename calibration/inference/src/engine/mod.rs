@@ -86,7 +86,6 @@ pub struct Engine {
 pub struct Question<'a> {
     /// Gains and effects: those that the engine knows ([`Ability::part`]).
     pub theta: &'a Theta,
-    /// Joints.
     pub dof: usize,
     /// What the encoders read at the start: positions, then velocities.
     pub start: &'a [f64],
@@ -105,7 +104,6 @@ pub struct Question<'a> {
 /// What is to be simulated of an object.
 #[derive(Debug, Clone, Copy)]
 pub struct ObjectQuestion<'a> {
-    /// Its numbers.
     pub body: &'a ObjectBody,
     /// Where its geometric centre rests at the start, in the base frame.
     pub start: &'a Pose<Base, Object>,
@@ -113,7 +111,6 @@ pub struct ObjectQuestion<'a> {
     pub times: &'a [f64],
 }
 
-/// No states.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum NoStates {
     /// The engine has none for these parameters.
@@ -164,7 +161,6 @@ impl Engine {
     }
 
     /// What it can do.
-    #[must_use]
     pub fn ability(&self) -> &Ability {
         &self.ability
     }
@@ -183,13 +179,11 @@ impl Engine {
     }
 
     /// Why it was given up.
-    #[must_use]
     pub fn failure(&self) -> Option<&EngineError> {
         self.failed.get()
     }
 
     /// What it was used for so far.
-    #[must_use]
     pub fn used(&self) -> Used {
         let count = |counter: &AtomicUsize| counter.load(Ordering::Relaxed);
         let asked_for = (&self.call.command[..], self.with_object.load(Ordering::Relaxed));

@@ -36,7 +36,6 @@ impl Used {
     }
 
     /// The same for a person, a sentence each.
-    #[must_use]
     pub fn sentences(&self) -> Vec<String> {
         let list = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
         let mut all = vec![format!(

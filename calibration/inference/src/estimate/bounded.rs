@@ -14,7 +14,6 @@ const RIDGE: f64 = 1e-12;
 /// no slope leads back (a servo arm's damping, 28.8 instead of 27.3 mrad left).
 ///
 /// `H` is `P x P` and symmetric, `g` and `room` have `P` entries.
-#[must_use]
 pub fn bounded_step(h: &DMatrix<f64>, g: &DVector<f64>, room: &[[f64; 2]], damping: f64) -> DVector<f64> {
     let mut step: DVector<f64> = DVector::zeros(g.len());
     let mut free: Vec<usize> = (0..g.len()).collect();

@@ -53,7 +53,6 @@ impl Descent<'_> {
     }
 
     /// By how much a step lowers the cost where the clips are as linear as they look.
-    #[must_use]
     pub fn promised(&self, step: &DVector<f64>) -> f64 {
         -(2.0 * self.gradient.dot(step) + step.dot(&(self.information * step)))
     }

@@ -52,19 +52,16 @@ impl Eliminated {
     }
 
     /// By how much the own numbers change to be at their best after a change `dx` of the shared ones, `Q`.
-    #[must_use]
     pub fn own_change(&self, dx: &DVector<f64>) -> DVector<f64> {
         &self.follows * dx.clone().insert_row(0, 1.0)
     }
 
     /// How the own numbers follow (1, the shared ones), `Q x (1 + P)`.
-    #[must_use]
     pub fn follows(&self) -> &DMatrix<f64> {
         &self.follows
     }
 
     /// Covariance of the own numbers given the shared ones, `Q x Q`.
-    #[must_use]
     pub fn own_covariance(&self) -> DMatrix<f64> {
         self.inner.as_ref().map_or_else(|| DMatrix::zeros(0, 0), Cholesky::inverse)
     }

@@ -11,13 +11,11 @@ pub struct Evolution(Cmaes);
 
 impl Evolution {
     /// Around `start`, coordinates in units of the bounds.
-    #[must_use]
     pub fn new(start: &[f64], seed: u64) -> Self {
         Self::of_width(start, FIRST_WIDTH, seed)
     }
 
     /// The same, the cloud at first of this width, in units of the bounds.
-    #[must_use]
     pub fn of_width(start: &[f64], width: f64, seed: u64) -> Self {
         let n = start.len();
         let bounds = Fitness::bounded(n, 1, &vec![0.0; n], &vec![1.0; n]);

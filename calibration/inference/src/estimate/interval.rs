@@ -32,7 +32,6 @@ pub const LEVEL: f64 = 0.95;
 
 impl Intervals {
     /// At the fit's numbers. Those in `held` were not free: they rest on a bound, or nothing depends on them.
-    #[must_use]
     pub fn new(fit: &Fit, held: &[bool]) -> Self {
         let n = fit.shared.len();
         let information = fit.information();
@@ -57,7 +56,6 @@ impl Intervals {
     }
 
     /// Half the 95 % intervals if clips that add `more` information were recorded besides.
-    #[must_use]
     pub fn with_more(&self, fit: &Fit, more: &DMatrix<f64>) -> Vec<f64> {
         let n = self.half_width.len();
         let free: Vec<usize> = (0..n).filter(|k| self.half_width[*k].is_finite()).collect();
@@ -75,7 +73,6 @@ impl Intervals {
 }
 
 /// How far the numbers move, to first order, when the slope at the fit changes by `slope`. Those in `held` stay.
-#[must_use]
 pub fn moved_by(fit: &Fit, held: &[bool], slope: &DVector<f64>) -> DVector<f64> {
     let (n, information) = (fit.shared.len(), fit.information());
     let free: Vec<usize> = (0..n).filter(|k| !held[*k] && information[(*k, *k)] > 0.0).collect();
@@ -83,7 +80,6 @@ pub fn moved_by(fit: &Fit, held: &[bool], slope: &DVector<f64>) -> DVector<f64> 
 }
 
 /// Which numbers rest on a bound of their search.
-#[must_use]
 pub fn at_bounds(unknowns: &[Unknown], shared: &[f64]) -> Vec<bool> {
     let near = |u: &Unknown, value: f64| {
         let tolerance = 1e-6 * (u.upper - u.lower);

@@ -42,20 +42,17 @@ pub struct Fit {
 
 impl Fit {
     /// `-2 ln` of the likelihood of all clips.
-    #[must_use]
     pub fn deviance(&self) -> f64 {
         self.clips.iter().map(|clip| clip.deviance).sum()
     }
 
     /// Mean squared residual, at least 1: by how much the residuals exceed their sigmas.
-    #[must_use]
     pub fn misfit(&self) -> f64 {
         let (chi2, rows) = self.clips.iter().fold((0.0, 0), |(chi2, rows), c| (chi2 + c.chi2, rows + c.rows));
         (chi2 / rows.max(1) as f64).max(1.0)
     }
 
     /// Information on the shared numbers from all clips, `P x P`.
-    #[must_use]
     pub fn information(&self) -> DMatrix<f64> {
         let parts = self.clips.iter().map(|clip| &clip.information);
         parts.fold(DMatrix::zeros(self.shared.len(), self.shared.len()), |sum, part| sum + part)

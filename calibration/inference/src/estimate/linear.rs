@@ -101,13 +101,11 @@ impl ClipFit {
     }
 
     /// Where the own numbers want to go with the shared ones held.
-    #[must_use]
     pub fn own_way(&self) -> &DVector<f64> {
         &self.own_step
     }
 
     /// The own numbers `share` of the way to where a step `dx` of the shared ones brings them.
-    #[must_use]
     pub fn own_part_way(&self, dx: &DVector<f64>, share: f64) -> Vec<f64> {
         let step = &self.own_step + &self.own_answer * dx;
         self.own.iter().zip(step.iter()).map(|(own, step)| own + share * step).collect()

@@ -3,15 +3,12 @@
 /// A slope and one sigma of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slope {
-    /// The slope.
     pub value: f64,
-    /// One sigma.
     pub sigma: f64,
 }
 
 /// `y = a x + b z` by least squares through the origin, from rows `[x, z, y]`, outliers beyond ten median residuals left out
 /// once; the slopes on `x` and `z`. `None` where they cannot be distinguished.
-#[must_use]
 pub fn plane(rows: &[[f64; 3]]) -> Option<[Slope; 2]> {
     let all = fitted(rows)?;
     let left = |[x, z, y]: &[f64; 3]| (y - all[0].value * x - all[1].value * z).abs();

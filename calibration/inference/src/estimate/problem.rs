@@ -20,14 +20,12 @@ pub struct Unknown {
 
 impl Unknown {
     /// How far down (at most 0 inside the bounds) and how far up the number may go from a value.
-    #[must_use]
     pub fn room(&self, from: f64) -> [f64; 2] {
         [self.lower - from, self.upper - from]
     }
 
     /// The same for one step of a search: a positive number that is known by its order of magnitude alone, as gains that nobody has
     /// published, is at most halved or doubled, since slopes say nothing about another order of magnitude.
-    #[must_use]
     pub fn reach(&self, from: f64) -> [f64; 2] {
         let [down, up] = self.room(from);
         if self.lower <= 0.0 || self.upper < WIDE * self.lower || down > 0.0 || up < 0.0 {
@@ -44,19 +42,16 @@ pub struct Random {
     pub name: String,
     /// One sigma of its scatter from clip to clip; 0 holds it at zero.
     pub sigma: f64,
-    /// Difference step.
     pub step: f64,
 }
 
 impl Random {
     /// The square of a clip's value in its sigmas; 0 of one that is held.
-    #[must_use]
     pub fn square(&self, value: f64) -> f64 {
         if self.sigma > 0.0 { (value / self.sigma).powi(2) } else { 0.0 }
     }
 
     /// `-2 ln` of the normal prior density of a clip's values, but for a constant.
-    #[must_use]
     pub fn penalty(random: &[Self], values: &[f64]) -> f64 {
         random.iter().zip(values).map(|(random, value)| random.square(*value)).sum()
     }

@@ -18,7 +18,6 @@ pub struct Witness {
 const ALONE: f64 = 0.02;
 
 /// Covariance of the answer; `None` where the information leaves a direction open or is not finite.
-#[must_use]
 pub fn covariance<'a>(
     information: &DMatrix<f64>,
     witnesses: impl Iterator<Item = &'a Witness>,

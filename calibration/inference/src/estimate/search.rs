@@ -19,9 +19,7 @@ pub trait Search {
 pub struct Found {
     /// The best numbers.
     pub numbers: Vec<f64>,
-    /// Their cost.
     pub cost: f64,
-    /// Costs told.
     pub evaluations: usize,
     /// Best cost after each round.
     pub history: Vec<f64>,
@@ -81,7 +79,6 @@ fn numbers(unknowns: &[Unknown], point: &[f64]) -> Vec<f64> {
 }
 
 /// Where a search begins, in units of the bounds.
-#[must_use]
 pub fn start(unknowns: &[Unknown]) -> Vec<f64> {
     let share = |u: &Unknown| if u.upper > u.lower { (u.start - u.lower) / (u.upper - u.lower) } else { 0.5 };
     unknowns.iter().map(|unknown| share(unknown).clamp(0.0, 1.0)).collect()

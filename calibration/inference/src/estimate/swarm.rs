@@ -4,7 +4,6 @@ use super::search::Search;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
-/// Particles.
 const PARTICLES: usize = 40;
 /// Share of its velocity that a particle keeps, and how strongly it is drawn to its own and to the common best place
 /// (Clerc & Kennedy's values for a sum of attractions of 4.1).
@@ -34,7 +33,6 @@ pub struct Swarm {
 
 impl Swarm {
     /// One particle at `start`, the others anywhere; coordinates in units of the bounds.
-    #[must_use]
     pub fn new(start: &[f64], seed: u64) -> Self {
         let mut random = Pcg64::seed_from_u64(seed);
         let particles = (0..PARTICLES)

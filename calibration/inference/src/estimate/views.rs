@@ -77,7 +77,6 @@ impl<M: ClipModel> ClipModel for Given<'_, M> {
 
 /// A model whose residuals are larger by what is known of each clip.
 pub struct Shifted<'a, M> {
-    /// The model.
     pub model: &'a M,
     /// What is added to the residuals, clip by clip.
     pub by: &'a [Vec<f64>],
@@ -114,7 +113,6 @@ impl<M: ClipModel> ClipModel for Shifted<'_, M> {
 
 /// Some clips of a model.
 pub struct Subset<'a, M> {
-    /// The model.
     pub model: &'a M,
     /// Which of its clips, in the order they get here.
     pub clips: &'a [usize],

@@ -58,14 +58,12 @@ pub struct Mover {
 
 impl Mover {
     /// By the twin's own dynamics. `nominal`: the arm as cell.toml describes it.
-    #[must_use]
     pub fn own(cell: &Cell, nominal: &ArmModel) -> Self {
         Self { cell: cell.clone(), nominal: nominal.clone(), known: Theta::default(), engine: None, wanted: Vec::new() }
     }
 
     /// By another program, where there is one; `known`: the cell's nominal parameters; `wanted`: what is compared of what it
     /// reports. Velocities are asked for besides, where it reports them: they say where joints were a moment ago.
-    #[must_use]
     pub fn by(self, engine: Option<Arc<Engine>>, known: Theta, mut wanted: Vec<Quantity>) -> Self {
         wanted.push(Quantity::Velocity);
         wanted.retain(|quantity| engine.as_ref().is_some_and(|engine| engine.ability().reports(*quantity)));

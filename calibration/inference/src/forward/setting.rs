@@ -32,9 +32,7 @@ pub enum Setting {
     TipFriction,
     /// A parameter of an effect of the registry, in its unit.
     Effect {
-        /// The effect.
         name: &'static str,
-        /// Its parameter.
         parameter: &'static str,
         /// Joint, or element of a vector; none for a single number, which stands for all joints.
         index: Option<usize>,
@@ -46,33 +44,27 @@ pub enum Setting {
 /// The cell cannot be completed to a full set of parameters.
 #[derive(Debug, thiserror::Error)]
 pub enum BaseError {
-    /// The arm.
     #[error(transparent)]
     Arm(#[from] ModelError),
-    /// Its gains.
     #[error(transparent)]
     Gains(#[from] GainError),
-    /// The object.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
 }
 
 impl Setting {
     /// The parameter of an effect behind it.
-    #[must_use]
     pub fn of_effect(&self) -> Option<&'static Parameter> {
         let Self::Effect { name, parameter, .. } = self else { return None };
         parameter_of(name, parameter)
     }
 
     /// How a search comes by a number of an effect.
-    #[must_use]
     pub fn search(&self) -> Option<Search> {
         self.of_effect().map(|parameter| parameter.search)
     }
 
     /// Name in reports: `stiffness[2]`, `command_delay.delay`, `1/joint_elasticity.stiffness[0]`.
-    #[must_use]
     pub fn name(&self) -> String {
         match self {
             Self::Stiffness(joint) => format!("stiffness[{joint}]"),
@@ -89,7 +81,6 @@ impl Setting {
     }
 
     /// SI unit of the number itself; `1` without.
-    #[must_use]
     pub fn unit(&self) -> String {
         match self {
             Self::Stiffness(_) => "N m/rad".into(),
@@ -105,7 +96,6 @@ impl Setting {
     }
 
     /// Name of the parameter that the number is one of: `stiffness`, `command_delay.delay`.
-    #[must_use]
     pub fn parameter(&self) -> String {
         match self {
             Self::Effect { name, parameter, .. } => format!("{name}.{parameter}"),
@@ -114,14 +104,12 @@ impl Setting {
     }
 
     /// The parameter's value for a value of the number.
-    #[must_use]
     pub fn physical(&self, number: f64) -> f64 {
         // An inverse below 0 has no meaning: as stiff as can be.
         if matches!(self, Self::Effect { inverse: true, .. }) { number.max(0.0).recip() } else { number }
     }
 
     /// The parameter's SI unit; `1` without.
-    #[must_use]
     pub fn physical_unit(&self) -> String {
         match self {
             Self::Effect { name, parameter, .. } => parameter_of(name, parameter).map_or("1", |p| p.unit).into(),
@@ -189,26 +177,22 @@ pub struct Settings {
 
 impl Settings {
     /// `base`: a complete theta, as [`complete`] makes it.
-    #[must_use]
     pub fn new(base: Theta, settings: Vec<Setting>) -> Self {
         let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
         Self { base, settings, dof }
     }
 
     /// What is turned, in the order of the numbers.
-    #[must_use]
     pub fn settings(&self) -> &[Setting] {
         &self.settings
     }
 
     /// The parameters that are not turned, and where the others begin.
-    #[must_use]
     pub fn base(&self) -> &Theta {
         &self.base
     }
 
     /// The parameters that go with these numbers.
-    #[must_use]
     pub fn theta(&self, shared: &[f64]) -> Theta {
         let mut theta = self.base.clone();
         for (setting, value) in self.settings.iter().zip(shared) {
@@ -218,7 +202,6 @@ impl Settings {
     }
 
     /// The numbers that go with parameters; `None` for those that `theta` does not hold.
-    #[must_use]
     pub fn numbers(&self, theta: &Theta) -> Vec<Option<f64>> {
         self.settings.iter().map(|setting| setting.read(theta)).collect()
     }

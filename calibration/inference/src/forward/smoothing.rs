@@ -15,7 +15,6 @@ const UNEVEN: f64 = 0.02;
 const ROWS: u64 = 4;
 
 /// Half the time over which a log is smoothed [ns]; `None` of fewer than two rows.
-#[must_use]
 pub fn half_width(stamps: &[u64]) -> Option<u64> {
     let (first, last) = (*stamps.first()?, *stamps.last()?);
     let usual = (last - first) / (stamps.len() as u64 - 1).max(1);
@@ -31,7 +30,6 @@ fn uneven(stamps: &[u64]) -> bool {
 }
 
 /// Positions and velocities at stamps, each from a cubic through the rows of positions around it.
-#[must_use]
 pub fn motion(series: &JointSeries, at_ns: &[u64], half: u64) -> JointSeries {
     let [q, dq, _] = derivatives((&series.stamps_ns, &series.q, series.dof), at_ns, half);
     JointSeries { dof: series.dof, stamps_ns: at_ns.to_vec(), q, dq, ..JointSeries::default() }
@@ -39,7 +37,6 @@ pub fn motion(series: &JointSeries, at_ns: &[u64], half: u64) -> JointSeries {
 
 /// Values, slopes [1/s] and curvatures [1/s²] at stamps, each from a cubic through the rows within `half` ns of it. Of `logged`: the
 /// stamps [ns], `dof` values a row, and `dof`; rows of the answer likewise.
-#[must_use]
 pub fn derivatives((stamps, values, dof): (&[u64], &[f64], usize), at_ns: &[u64], half: u64) -> [Vec<f64>; 3] {
     let unit = half as f64 * 1e-9;
     let mut out: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(at_ns.len() * dof));

@@ -12,7 +12,6 @@ pub struct Fingerprint(DefaultHasher);
 
 impl Fingerprint {
     /// Of a command, in this build of the program.
-    #[must_use]
     pub fn of(command: &str) -> Self {
         Self::in_build(command, command_line::fingerprint())
     }
@@ -24,14 +23,12 @@ impl Fingerprint {
     }
 
     /// With a setting.
-    #[must_use]
     pub fn with(mut self, setting: &impl Hash) -> Self {
         setting.hash(&mut self.0);
         self
     }
 
     /// With numbers, to the last bit.
-    #[must_use]
     pub fn with_numbers<'a>(mut self, numbers: impl IntoIterator<Item = &'a f64>) -> Self {
         let mut count = 0_usize;
         for number in numbers {
@@ -43,7 +40,6 @@ impl Fingerprint {
     }
 
     /// With a cell: its numbers, and what the descriptions and meshes hold that it names.
-    #[must_use]
     pub fn with_cell(self, cell: &Cell) -> Self {
         let robot = cell.robot.iter().filter_map(|robot| robot.urdf.as_ref());
         let objects = cell.objects.iter().flat_map(|object| [&object.mesh, &object.urdf]).flatten();
@@ -55,7 +51,6 @@ impl Fingerprint {
     }
 
     /// With the rows of clips, to the last bit, and their names; not with where they lie.
-    #[must_use]
     pub fn with_clips<'a>(self, clips: impl IntoIterator<Item = &'a Clip>) -> Self {
         clips.into_iter().fold(self, |print, clip| {
             let name = clip.file.file_name();
@@ -71,8 +66,6 @@ impl Fingerprint {
         })
     }
 
-    /// The number.
-    #[must_use]
     pub fn number(&self) -> u64 {
         self.0.finish()
     }

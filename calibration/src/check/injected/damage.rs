@@ -46,7 +46,6 @@ impl Draw {
 }
 
 /// A session with the fault, as it is after reading; `None` where it has nothing that could have it.
-#[must_use]
 pub fn inject(fault: Injected, session: &Clean, seed: u64) -> Option<Clean> {
     if !fault.fits(session) {
         return None;

@@ -114,7 +114,6 @@ impl Injected {
     ];
 
     /// Its name in tables.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::LostPackets => "lost packets",
@@ -154,7 +153,6 @@ impl Injected {
     }
 
     /// Whether a remark names this fault.
-    #[must_use]
     pub fn is_found_as(self, fault: Fault) -> bool {
         match self {
             Self::LostPackets => fault == Fault::LostSamples,
@@ -186,7 +184,6 @@ impl Injected {
     }
 
     /// Whether a session has what could have the fault.
-    #[must_use]
     pub fn fits(self, session: &Clean) -> bool {
         let tossed = session.clips.iter().any(|(_, clip)| clip.kind == ClipKind::FreeMotion);
         match self {

@@ -20,7 +20,6 @@ pub struct Trial {
 
 impl Trial {
     /// Looks at a clean session.
-    #[must_use]
     pub fn clean(session: &Clean) -> Self {
         let remarks = check_clips(&session.cell, &session.clips).remarks;
         let beside: Vec<Fault> = remarks.iter().map(|remark| remark.fault).collect();
@@ -28,7 +27,6 @@ impl Trial {
     }
 
     /// Puts a fault into a clean session and looks at it; `None` where the session has nothing that could have the fault.
-    #[must_use]
     pub fn with(fault: Injected, session: &Clean, seed: u64) -> Option<Self> {
         let damaged = inject(fault, session, seed)?;
         let remarks = check_clips(&damaged.cell, &damaged.clips).remarks;
@@ -41,15 +39,12 @@ impl Trial {
 /// A count of successes with its 95 % interval after Wilson (1927).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
-    /// Successes.
     pub right: usize,
-    /// Trials.
     pub all: usize,
 }
 
 impl Score {
     /// The interval of the rate.
-    #[must_use]
     pub fn interval(self) -> [f64; 2] {
         if self.all == 0 {
             return [0.0, 1.0];
@@ -61,15 +56,12 @@ impl Score {
         [(middle - half).max(0.0), (middle + half).min(1.0)]
     }
 
-    /// The rate.
-    #[must_use]
     pub fn rate(self) -> f64 {
         self.right as f64 / self.all.max(1) as f64
     }
 }
 
 /// A line for each fault and one for the clean sessions.
-#[must_use]
 pub fn table(trials: &[Trial]) -> String {
     let mut by_fault: BTreeMap<Option<Injected>, Vec<&Trial>> = BTreeMap::new();
     for trial in trials {

@@ -79,7 +79,6 @@ impl Clean {
     }
 
     /// A recorded session that is taken for clean; clips that cannot be read are left out.
-    #[must_use]
     pub fn recorded(session: &Session) -> Self {
         let read =
             |entry: &shared_mem::cell::ClipEntry| Some((entry.file.display().to_string(), session.read(entry).ok()?));
@@ -87,20 +86,17 @@ impl Clean {
     }
 
     /// Whether there are poses of an object.
-    #[must_use]
     pub fn has_poses(&self) -> bool {
         self.clips.iter().any(|(_, clip)| !clip.object.is_empty())
     }
 
     /// How many times as long as the shortest clip the longest is.
-    #[must_use]
     pub fn paces(&self) -> f64 {
         let seconds = || self.clips.iter().map(|(_, clip)| clip.desired.duration());
         seconds().fold(0.0, f64::max) / seconds().fold(f64::INFINITY, f64::min).max(1e-3)
     }
 
     /// Whether there is an arm.
-    #[must_use]
     pub fn has_arm(&self) -> bool {
         self.clips.iter().any(|(_, clip)| !clip.measured.is_empty())
     }

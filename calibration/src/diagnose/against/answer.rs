@@ -10,7 +10,6 @@ use std::path::PathBuf;
 /// What was found about two sessions of one robot.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Comparison {
-    /// The finding.
     pub verdict: Verdict,
     /// The gap of B's held-out clips: under what was found on A alone, and with what changed.
     pub gap: Gap,
@@ -35,7 +34,6 @@ pub struct Comparison {
     pub seconds: f64,
     /// The session whose model B is held to: A.
     pub session: String,
-    /// B.
     pub against: String,
     /// How both were named.
     #[serde(skip)]
@@ -48,7 +46,6 @@ pub struct Comparison {
     pub theta_file: Option<PathBuf>,
 }
 
-/// The finding.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Verdict {
     /// `none`: nothing changed as far as these clips show; `named`; `class`; `unexplained`: B deviates, and nothing that may change
@@ -88,9 +85,7 @@ pub struct Candidate {
 /// A parameter in both sessions, in SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
-    /// In A.
     pub a: Vec<f64>,
-    /// In B.
     pub b: Vec<f64>,
     /// B less A.
     pub change: Vec<f64>,
@@ -105,12 +100,10 @@ pub struct Values {
 pub struct Smallest {
     /// Of each number alone.
     pub values: Vec<f64>,
-    /// SI unit.
     pub unit: String,
 }
 
 impl Values {
-    /// None yet.
     pub(super) fn new(unit: &str) -> Self {
         let nothing = Vec::new;
         Self { a: nothing(), b: nothing(), change: nothing(), ci95: Vec::new(), unit: unit.to_owned() }

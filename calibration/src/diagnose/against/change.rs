@@ -10,7 +10,6 @@ use crate::page::words;
 const MOST: usize = 3;
 
 /// `mass 0 to 0.520 kg (change 0.52 [0.50, 0.54] kg)`; of many numbers how far they reach.
-#[must_use]
 pub fn between(name: &str, values: &Values) -> String {
     let unit = unit_of(values);
     let name = words(name);
@@ -53,7 +52,6 @@ pub fn rows(subject: &str, name: &str, values: &Values) -> Vec<[String; 4]> {
 }
 
 /// `coulomb 0.021 N m`, or `coulomb 0.021 to 0.11 N m, joint by joint`.
-#[must_use]
 pub fn smallest_in_words(name: &str, subject: &str, smallest: &Smallest) -> String {
     let [low, high] = span(smallest.values.iter().copied());
     let unit = Unit::suited(&smallest.unit, high);

@@ -36,7 +36,6 @@ const MORE_THAN_A: f64 = 2.0;
 pub(super) struct Case<'a> {
     /// The sessions, A first.
     pub(super) sessions: [&'a Session; 2],
-    /// Their clips.
     pub(super) pair: &'a Pair,
     /// What was found on A alone.
     pub(super) of_a: &'a Hypothesis,

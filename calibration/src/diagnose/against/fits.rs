@@ -24,7 +24,6 @@ pub(super) struct PairBench<'a, E> {
 /// A model at its best.
 #[derive(Debug, Clone)]
 pub(super) struct Fitted {
-    /// Its numbers.
     pub(super) model: Model,
     /// The same as a hypothesis over what is turned.
     pub(super) hypothesis: Hypothesis,

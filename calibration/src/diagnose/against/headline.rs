@@ -52,7 +52,6 @@ impl Facts {
     }
 }
 
-/// The sentence.
 pub(super) fn sentence(kind: Kind, facts: &Facts) -> String {
     let changes = facts.changes.join(", and ");
     match kind {

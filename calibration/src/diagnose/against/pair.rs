@@ -58,7 +58,6 @@ pub fn pair([a, b]: [&Session; 2]) -> Result<Pair, Unlike> {
 
 impl Pair {
     /// Of clips that were admitted already, with remarks on the cells. `tracking`: torques along the measured motion are compared.
-    #[must_use]
     pub fn of([a, b]: [Admitted; 2], tracking: bool, remarks: Vec<String>) -> Self {
         let first_of_b = a.clips.len();
         let tagged =

@@ -38,7 +38,6 @@ pub(super) const STAGES: [Planned; 5] =
 pub(super) struct Trial {
     /// Index of the subject.
     pub(super) subject: usize,
-    /// With it.
     pub(super) fitted: Fitted,
     /// What it is worth over the same thing in both sessions.
     pub(super) change: Worth,
@@ -55,7 +54,6 @@ impl Trial {
     }
 }
 
-/// One step.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
     /// What the slopes say of every subject that has not changed, the most promising first.

@@ -18,13 +18,11 @@ pub(super) enum Side {
     B,
 }
 
-/// Both.
 pub(super) const SIDES: [Side; 2] = [Side::A, Side::B];
 
 /// In which sessions a number acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Acts {
-    /// In both.
     Everywhere,
     /// In one of them.
     In(Side),
@@ -39,7 +37,6 @@ impl Acts {
 /// A number of the library that a fit turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Turned {
-    /// Its index.
     pub(super) number: usize,
     /// Where it acts.
     pub(super) acts: Acts,

@@ -29,20 +29,17 @@ pub struct Admitted {
 
 impl Admitted {
     /// Clips that need no look: `files` are theirs, `with_object` as in the field.
-    #[must_use]
     pub fn of(clips: Vec<Clip>, files: Vec<String>, with_object: bool) -> Self {
         let groups = split::by_command(&clips);
         Self { commands: groups.len(), groups, clips, files, with_object, warnings: Vec::new() }
     }
 
     /// Whether objects move by themselves in all clips: tosses and slides.
-    #[must_use]
     pub fn objects_alone(&self) -> bool {
         self.clips.iter().all(|clip| clip.kind == ClipKind::FreeMotion)
     }
 
     /// Where the objects slid; `None` where it is the arm that the clips are for.
-    #[must_use]
     pub fn ground(&self) -> Option<Ground> {
         Ground::of(&self.clips).filter(|_| self.with_object)
     }
@@ -54,7 +51,6 @@ pub enum Refused {
     /// Nothing can be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The arm.
     #[error(transparent)]
     Arm(#[from] ModelError),
     /// Torques cannot be predicted.

@@ -35,7 +35,6 @@ pub struct Patch {
 
 impl Ground {
     /// What the clips' objects crossed; `None` where none was tracked.
-    #[must_use]
     pub fn of(clips: &[Clip]) -> Option<Self> {
         let mut places: Vec<[f64; 2]> = Vec::new();
         for clip in clips {
@@ -55,7 +54,6 @@ impl Ground {
     }
 
     /// Where to look for a patch: beyond lines through the middle and beside it, and in discs whose edges pass through it.
-    #[must_use]
     pub fn patches(&self) -> Vec<Patch> {
         let angles = || (0..8).map(|eighth| FIRST + f64::from(eighth) * FRAC_PI_4);
         let [x, y] = self.middle;

@@ -16,7 +16,6 @@ const APART: f64 = 0.05;
 
 /// Cuts the longest clips of arms alone to one length, so that 96 s are left: of each the part in which its commands move
 /// the joints most. What was done, for the reader.
-#[must_use]
 pub fn liveliest(clips: &mut [Clip]) -> Option<String> {
     let seconds: Vec<f64> = clips.iter().map(|clip| clip.measured.duration()).collect();
     let most = equal_share(&seconds)?;

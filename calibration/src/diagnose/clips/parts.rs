@@ -24,7 +24,6 @@ const SETS: usize = 5;
 impl Admitted {
     /// Clips of arms alone in parts, where there are fewer different commands than a session can be split by. Clips with an
     /// object stay whole: a hit is one event.
-    #[must_use]
     pub fn in_parts(self) -> Self {
         let few = self.commands < FEW && self.clips.iter().all(|clip| clip.kind == ClipKind::Excitation);
         let seconds = |group: &Vec<usize>| {
@@ -53,7 +52,6 @@ impl Admitted {
     }
 
     /// Which clips are for what.
-    #[must_use]
     pub fn split(&self, seed: u64) -> Split {
         if self.commands >= FEW {
             return Split::new(&self.groups, seed);
@@ -70,7 +68,6 @@ impl Admitted {
     }
 
     /// How many clips there are where they count in parts; `None` where they count whole.
-    #[must_use]
     pub fn cut(&self) -> Option<usize> {
         let mut files = self.files.clone();
         files.dedup();
@@ -78,7 +75,6 @@ impl Admitted {
     }
 
     /// What a clip is called among all: its file, and which part of it where it counts in parts.
-    #[must_use]
     pub fn label(&self, clip: usize) -> String {
         let file = &self.files[clip];
         let places: Vec<usize> = (0..self.files.len()).filter(|other| self.files[*other] == *file).collect();

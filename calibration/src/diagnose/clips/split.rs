@@ -27,7 +27,6 @@ pub(in crate::diagnose) const FEW: usize = 8;
 impl Split {
     /// Half of the command groups for training, a quarter each for choosing and confirming, interleaved so that all three
     /// see the whole session. `seed` turns the order. Fewer than eight are left out in turn.
-    #[must_use]
     pub fn new(groups: &[Vec<usize>], seed: u64) -> Self {
         if groups.len() < FEW {
             return Self::in_turn(groups);
@@ -49,7 +48,6 @@ impl Split {
     }
 
     /// All clips for training and for confirming, each group left out in turn.
-    #[must_use]
     pub fn in_turn(groups: &[Vec<usize>]) -> Self {
         let mut all = groups.concat();
         all.sort_unstable();
@@ -57,13 +55,11 @@ impl Split {
     }
 
     /// Clips that tell whether a fit does harm elsewhere: those for choosing, or all where none can be spared.
-    #[must_use]
     pub fn elsewhere(&self) -> &[usize] {
         if self.in_turn.is_empty() { &self.choose } else { &self.train }
     }
 
     /// Clips on which hypotheses may be judged: all but those for confirming, or all where none can be spared.
-    #[must_use]
     pub fn open(&self) -> Vec<usize> {
         let mut open = [self.train.clone(), self.choose.clone()].concat();
         open.sort_unstable();
@@ -78,7 +74,6 @@ const SAME: f64 = 1e-4;
 type Moving = Option<Vec<SetPoint>>;
 
 /// Clips grouped by their commands, groups in the order of their first clips.
-#[must_use]
 pub fn by_command(clips: &[Clip]) -> Vec<Vec<usize>> {
     let moving: Vec<Moving> = clips.iter().map(|clip| recorded::motion(&clip.desired).ok()).collect();
     let same = |a: usize, b: usize| same_rows(&clips[a], &clips[b]) || same_motion(&moving[a], &moving[b]);

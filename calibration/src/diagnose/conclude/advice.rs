@@ -78,7 +78,6 @@ fn by_hand(effect: &str) -> &'static str {
 }
 
 /// What to record next to separate these effects.
-#[must_use]
 pub fn separating(effects: &[&str], site: &Site) -> Advice {
     let pairs = effects.iter().enumerate().flat_map(|(k, a)| effects[k + 1..].iter().map(move |b| (*a, *b)));
     if let (true, [first, ..]) = (site.objects_alone(), effects) {
@@ -105,7 +104,6 @@ pub fn separating(effects: &[&str], site: &Site) -> Advice {
 }
 
 /// What to record next to confirm what was found.
-#[must_use]
 pub fn confirming(effects: &[String], site: &Site) -> Advice {
     let (clips, steps) = site.again(2);
     let effects: Vec<String> = effects.iter().map(|effect| words(effect)).collect();
@@ -113,7 +111,6 @@ pub fn confirming(effects: &[String], site: &Site) -> Advice {
 }
 
 /// What to record where something unknown is left.
-#[must_use]
 pub fn unexplained(place: Option<(&str, &str)>, site: &Site) -> Advice {
     let Some((channel, regime)) = place else { return Advice::default() };
     let (clips, steps) = site.again(8);
@@ -125,21 +122,18 @@ pub fn unexplained(place: Option<(&str, &str)>, site: &Site) -> Advice {
 }
 
 /// What to record where an effect is likely, and so many clips more would prove it.
-#[must_use]
 pub fn proving(effect: &str, more: usize, site: &Site) -> Advice {
     let sentence = format!("Record {more} clips more with other motions, which prove or refute {}.", words(effect));
     site.more(sentence, more)
 }
 
 /// What to record where the clips do not say enough.
-#[must_use]
 pub fn lacking(why: &str, site: &Site) -> Advice {
     let command = if site.strikes() { Strokes("--clips 12") } else { Arm(ArmMotion::of(Kind::Multisine, 8)) };
     site.advice(format!("Record a session that has what this one lacks: {why}."), &[command])
 }
 
 /// What to record where nothing is open.
-#[must_use]
 pub fn nothing_open(site: &Site) -> Advice {
     let commands = site.usual();
     let sentence = "Nothing is open; record the next session as usual.".into();
@@ -147,7 +141,6 @@ pub fn nothing_open(site: &Site) -> Advice {
 }
 
 /// Every advice there is, for those who check that each can be carried out.
-#[must_use]
 pub fn all(site: &Site) -> Vec<Advice> {
     let mut all: Vec<Advice> = Vec::new();
     for effect in twin::effects::registry() {

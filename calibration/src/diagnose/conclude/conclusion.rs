@@ -35,7 +35,6 @@ const FLOOR: f64 = 1.0;
 const TRACES: usize = 12;
 
 /// The answer where the clips do not say enough.
-#[must_use]
 pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosis {
     let nothing = Share { value: 0.0, ci90: [0.0; 2] };
     let site = Site::of(session, options.report.as_deref());

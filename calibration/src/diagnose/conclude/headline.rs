@@ -40,8 +40,6 @@ impl Shrunk {
 /// Residuals beyond this multiple of the noise are said, even where they are no gap.
 const ROUGH: f64 = 1.25;
 
-/// The sentence.
-#[must_use]
 pub fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
     match decision.kind {
         Kind::None => none(finding, facts),
@@ -88,7 +86,6 @@ fn named(finding: &Finding<'_>, facts: &Facts) -> String {
 
 /// The sentence where what was found is proven, but a part of the gap stays. `share`: what it explains, and whether it is stronger
 /// than what is met in practice; `after`: how large what stays is; `rivals`: effects that do as well as one of those found.
-#[must_use]
 pub fn in_part(
     facts: &Facts,
     (share, unusual): (&Share, bool),

@@ -30,7 +30,6 @@ pub(in crate::diagnose) struct Judged<'a> {
     pub(in crate::diagnose) finding: &'a Finding<'a>,
 }
 
-/// The reason.
 pub(in crate::diagnose) fn reason<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>) -> String {
     let scored = &judged.trial.scored;
     let text = match (judged.status, &judged.trial.fitted) {

@@ -45,7 +45,6 @@ pub(in crate::diagnose) enum Capture {
     Arm(ArmMotion),
     /// A stroke of the session again, with these arguments; a new one where there is none to repeat.
     StrokeAgain(&'static str),
-    /// New strokes.
     Strokes(&'static str),
     /// New strokes into a session of its own, named so, because something in the cell is another then.
     Elsewhere(&'static str, &'static str),
@@ -84,7 +83,6 @@ impl Site {
     /// Of a session whose clips lie on disk; where they cannot be read again, nothing can be repeated. Where a cell.toml was
     /// given besides, clips go into a session of their own, which is captured with it: the folder's own cell.toml is another
     /// one, or there is none, and the one given lists no new clips. `page`: where the command that advises writes its own.
-    #[must_use]
     pub fn of(session: &Session, page: Option<&Path>) -> Self {
         let object = session.cell.one_of_several().map(str::to_owned);
         Self { page: page.map(Path::to_owned), object, ..Self::found(session) }
@@ -132,7 +130,6 @@ impl Site {
     }
 
     /// Of a session of the simulation in `folder` with clips that can be repeated, the first of them `fastest` times as fast at most.
-    #[must_use]
     pub fn new(folder: &Path, strokes: bool, clips: Vec<usize>, fastest: f64) -> Self {
         // Without a slash at its end, and never nothing: a clip may lie where the program runs.
         let folder: PathBuf = folder.components().collect();

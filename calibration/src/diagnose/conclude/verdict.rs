@@ -46,7 +46,6 @@ pub struct Decision {
 
 impl Decision {
     /// The verdict with its sentence.
-    #[must_use]
     pub fn said(self, text: String) -> Verdict {
         let Self { kind, effects, confidence, .. } = self;
         Verdict { kind, effects, confidence, text, explained_share: None, rest: None }
@@ -55,7 +54,6 @@ impl Decision {
 
 impl Verdict {
     /// What [`Verdict::confidence`] is.
-    #[must_use]
     pub fn basis(&self) -> Basis {
         let most = match self.kind {
             Kind::Named => confidence::MOST,
@@ -77,8 +75,6 @@ const ALL_BUT_EXACT: f64 = 99.5;
 const LIKELY: f64 = 0.5;
 
 impl Finding<'_> {
-    /// The verdict.
-    #[must_use]
     pub fn decide(&self) -> Decision {
         if self.within_tolerance[0] {
             return self.none();
@@ -145,7 +141,6 @@ impl Finding<'_> {
 }
 
 /// The verdict when the clips do not say enough.
-#[must_use]
 pub fn not_testable(why: &str) -> Verdict {
     let decision = Decision { kind: Kind::NotTestable, effects: Vec::new(), confidence: 1.0, little: false };
     decision.said(format!("Not testable: {why}."))
@@ -154,7 +149,6 @@ pub fn not_testable(why: &str) -> Verdict {
 impl Verdict {
     /// The same of a diagnosis whose time was spent. `cut_short`: not everything was tried, so that what is unexplained need not
     /// be.
-    #[must_use]
     pub fn so_far(self, budget: Duration, cut_short: bool) -> Self {
         let kind = if cut_short && self.kind == Kind::Unexplained { Kind::NotTestable } else { self.kind };
         let budget = budget.as_secs_f64();

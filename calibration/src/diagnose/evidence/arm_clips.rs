@@ -99,7 +99,6 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     }
 
     /// The same moved by another program, where there is one; `known`: the cell's nominal parameters.
-    #[must_use]
     pub fn moved_by(mut self, engine: Option<Arc<Engine>>, known: &Theta) -> Self {
         self.twin = engine.is_some().then(|| self.mover.clone());
         let wanted = self.channels.iter().map(|channel| Quantity::named(channel.quantity)).collect();

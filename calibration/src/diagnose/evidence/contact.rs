@@ -51,7 +51,6 @@ impl Contact {
     }
 
     /// What its residuals are about. `all`: [`ObjectClips::rows`]; `first`: index of the first joint's channel.
-    #[must_use]
     pub fn evidence(&self, all: &[object::Row], first: usize) -> Vec<Row> {
         let start_ns = all.first().map_or(0, |row| row.stamp_ns);
         let one = |(k, row): (usize, &object::Row)| {
@@ -63,7 +62,6 @@ impl Contact {
 
     /// Errors of the joints [rad] in sigmas of their encoders, but for what a vertical force would make of them under these
     /// gains [N m/rad].
-    #[must_use]
     pub fn in_sigmas(&self, errors: &[f64], stiffness: &[f64]) -> Vec<f64> {
         let dof = self.sigma.len().max(1);
         let at = |(errors, lever): (&[f64], &Joints)| {

@@ -24,7 +24,6 @@ pub enum StageName {
 
 impl StageName {
     /// Name in reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Control => "control",
@@ -55,7 +54,6 @@ pub struct Channel {
     pub place: String,
     /// The joint it belongs to, from 0; `None` for the object's.
     pub joint: Option<usize>,
-    /// Whose sensors.
     pub group: Group,
 }
 
@@ -75,7 +73,6 @@ pub struct Row {
 /// What a number can change of a clip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
-    /// Anything.
     All,
     /// The residuals of the arm that moves alone; what it does in contact and to the object by way of the arm is left out.
     Arm,

@@ -1,7 +1,6 @@
 //! How many of neighbouring residuals say the same.
 
 /// How many neighbouring residuals say the same: 1 for white ones, `1 + 2 sum rho` up to where `rho` first falls below zero.
-#[must_use]
 pub fn correlation_length(values: &[f64]) -> f64 {
     let power: f64 = values.iter().map(|v| v * v).sum();
     if power <= 0.0 {

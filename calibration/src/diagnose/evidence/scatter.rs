@@ -44,7 +44,6 @@ impl Default for Scatter {
 
 impl Scatter {
     /// The same with the heavy-tailed numbers so many times as wide.
-    #[must_use]
     pub fn scaled(&self, scale: f64) -> Self {
         let mut scaled = self.clone();
         scaled.random[self.heavy.clone()].iter_mut().for_each(|number| number.sigma *= scale);
@@ -52,13 +51,11 @@ impl Scatter {
     }
 
     /// Held to so many times less scatter, but for the clips that went their own way before.
-    #[must_use]
     pub fn narrowed(&self, scale: f64) -> Self {
         Self { forgiving: 1.0 / scale, ..self.scaled(scale) }
     }
 
     /// How many numbers a clip has of its own.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.random.len()
     }
@@ -75,7 +72,6 @@ impl Scatter {
     }
 
     /// Prior precision of every number near `own`; 1 for those that do not scatter, which keeps them where they are.
-    #[must_use]
     pub fn precision(&self, own: &[f64]) -> Vec<f64> {
         let hold = self.hold(own);
         let of = |(k, random): (usize, &Random)| match random.sigma {
@@ -87,7 +83,6 @@ impl Scatter {
     }
 
     /// `-2 ln` of the prior density, but for a constant.
-    #[must_use]
     pub fn penalty(&self, own: &[f64]) -> f64 {
         let light = (self.random.iter().enumerate())
             .filter(|(k, _)| !self.heavy.contains(k))
@@ -101,7 +96,6 @@ impl Scatter {
 
     /// What a normal prior with [`Self::precision`] counts less than the heavy-tailed one, as part of a deviance whose
     /// volume is taken with that precision.
-    #[must_use]
     pub fn correction(&self, own: &[f64]) -> f64 {
         let hold = self.hold(own);
         self.tails(own) - hold * self.heavy_square(own) + self.heavy.len() as f64 * hold.ln()

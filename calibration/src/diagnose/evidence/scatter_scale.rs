@@ -29,7 +29,6 @@ pub struct Around {
 
 /// What every clip's deviance changes by at the scale at which all of them together are most likely; nothing where no
 /// number has heavy tails.
-#[must_use]
 pub fn at_the_best_scale(clips: &[&Around], scatter: &Scatter) -> Vec<f64> {
     if scatter.heavy.is_empty() {
         return vec![0.0; clips.len()];

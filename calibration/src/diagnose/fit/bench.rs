@@ -16,9 +16,7 @@ use twin::effects::{EffectInfo, Place, Role};
 
 /// What every step of the diagnosis is given.
 pub struct Bench<'a, E> {
-    /// The clips.
     pub evidence: &'a E,
-    /// The candidates.
     pub library: &'a Library,
     /// What varies from clip to clip.
     pub scatter: Scatter,
@@ -48,7 +46,6 @@ pub struct FittedClip<V = WithOwn> {
 
 impl<V> FittedClip<V> {
     /// `-2 ln` of its likelihood.
-    #[must_use]
     pub fn deviance(&self) -> f64 {
         self.reduced.form[(0, 0)] + self.reduced.volume
     }
@@ -61,7 +58,6 @@ impl<V> FittedClip<V> {
 pub struct Hypothesis<V = WithOwn> {
     /// Candidates that act, in the order in which they were found.
     pub effects: Vec<usize>,
-    /// All numbers.
     pub full: Vec<f64>,
     /// Indices of the free ones.
     pub free: Vec<usize>,
@@ -71,19 +67,16 @@ pub struct Hypothesis<V = WithOwn> {
 
 impl<V> Hypothesis<V> {
     /// Clips it was fitted to.
-    #[must_use]
     pub fn clips(&self) -> Vec<usize> {
         self.fitted.iter().map(|fitted| fitted.clip).collect()
     }
 
     /// `-2 ln` of the likelihood of the clips it was fitted to.
-    #[must_use]
     pub fn deviance(&self) -> f64 {
         self.fitted.iter().map(FittedClip::deviance).sum()
     }
 
     /// A clip's own numbers where it was fitted, else at rest.
-    #[must_use]
     pub fn own(&self, clip: usize, count: usize) -> Vec<f64> {
         let fitted = self.fitted.iter().find(|fitted| fitted.clip == clip);
         fitted.map_or_else(|| vec![0.0; count], |fitted| fitted.own.clone())
@@ -113,7 +106,6 @@ fn least(effect: &EffectInfo) -> f64 {
 
 impl<E: Measured> Bench<'_, E> {
     /// Numbers that are free when these effects act.
-    #[must_use]
     pub fn free(&self, effects: &[usize]) -> Vec<usize> {
         let of_effects = effects.iter().flat_map(|effect| self.library.candidates[*effect].turned.clone());
         self.library.baseline.clone().chain(of_effects).collect()
@@ -132,7 +124,6 @@ impl<E: Measured> Bench<'_, E> {
     /// Fits effects on clips from `full` on, each clip's own numbers from `near` on.
     ///
     /// `None` when the twin has no answer at the start.
-    #[must_use]
     pub fn fit(
         &self,
         (effects, full): (&[usize], Vec<f64>),
@@ -150,7 +141,6 @@ impl<E: Measured> Bench<'_, E> {
     }
 
     /// A step of this bench by its name.
-    #[must_use]
     pub fn step(&self, name: &str) -> Fingerprint {
         Fingerprint::of(name).with(&self.trail.1)
     }
@@ -210,13 +200,11 @@ impl<E: Measured> Bench<'_, E> {
     }
 
     /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
-    #[must_use]
     pub fn trying(&self, candidate: usize, effort: Effort) -> Effort {
         Effort { holds_joints: !self.library.candidates[candidate].is_of_arm(), ..effort }
     }
 
     /// Adds a candidate to a hypothesis and fits both from `full` on.
-    #[must_use]
     pub fn extend(
         &self,
         from: &Hypothesis<E::Own>,
@@ -231,7 +219,6 @@ impl<E: Measured> Bench<'_, E> {
     }
 
     /// `full` with the candidate as strong as the score test says, within what is met in practice.
-    #[must_use]
     pub fn begun(&self, mut full: Vec<f64>, scored: &Scored) -> Vec<f64> {
         let alternative = &self.library.candidates[scored.candidate].alternatives[scored.alternative];
         for (k, value) in &alternative.form {
@@ -262,7 +249,6 @@ impl<E: Measured> Bench<'_, E> {
     }
 
     /// Clips that were not fitted, at a hypothesis' numbers with their own ones at their best.
-    #[must_use]
     pub fn judge(
         &self,
         hypothesis: &Hypothesis<E::Own>,
@@ -307,7 +293,6 @@ impl<E: Measured> Bench<'_, E> {
     }
 
     /// Whether an effect of a hypothesis is so weak that any two simulations differ as much.
-    #[must_use]
     pub fn negligible(&self, effect: usize, full: &[f64]) -> bool {
         let candidate = &self.library.candidates[effect];
         let shares = candidate.sizes.iter().filter_map(|size| {
@@ -320,7 +305,6 @@ impl<E: Measured> Bench<'_, E> {
 
     /// Whether an effect of a hypothesis does no more to commands that another changes already than shift them by a control
     /// period: from which period on a filtered command acts is every engine's own.
-    #[must_use]
     pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis<E::Own>) -> bool {
         let of_commands = |k: &usize| self.library.candidates[*k].effect.acts_on == Place::CommandPath;
         let weak = |size: &usize| hypothesis.full[*size] - self.library.unknowns[*size].start < CONVENTION;
@@ -330,7 +314,6 @@ impl<E: Measured> Bench<'_, E> {
     }
 
     /// The sum of fitted clips' forms, numbers held to their known ranges.
-    #[must_use]
     pub fn held(&self, hypothesis: &Hypothesis<E::Own>) -> DMatrix<f64> {
         let size = 1 + hypothesis.free.len();
         let mut sum = hypothesis.fitted.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.reduced.form);

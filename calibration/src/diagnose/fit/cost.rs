@@ -29,7 +29,6 @@ impl<E: Measured> Bench<'_, E> {
     }
 
     /// The cost of clips with their own numbers at rest: where these were fitted they hide a part of the gap.
-    #[must_use]
     pub fn plain_cost(&self, clips: &[usize], full: &[f64], weights: &[f64]) -> Option<f64> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips: Vec<_> = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
@@ -37,7 +36,6 @@ impl<E: Measured> Bench<'_, E> {
     }
 
     /// [`Self::plain_cost`] where it is less than `bound`; clips are not asked any more once it is not.
-    #[must_use]
     pub fn plain_cost_below(&self, clips: &[usize], full: &[f64], weights: &[f64], bound: f64) -> Option<f64> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips: Vec<_> = clips.iter().map(|clip| (*clip, nothing.clone())).collect();

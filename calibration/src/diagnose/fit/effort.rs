@@ -18,7 +18,6 @@ pub struct Effort {
 
 impl Effort {
     /// So many linearisations, taken like this, of all numbers.
-    #[must_use]
     pub const fn of(iterations: usize, precision: Precision) -> Self {
         Self { iterations, precision, holds_joints: false, frees_held: false }
     }

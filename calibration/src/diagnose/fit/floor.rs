@@ -16,14 +16,12 @@ use nalgebra::{DMatrix, DVector};
 
 /// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any
 /// engine is off there by many times their noise.
-#[must_use]
 pub fn sensors_alone(evidence: &impl Measured) -> Vec<f64> {
     let known = |channel: &Channel| if channel.group == Group::Contact { 0.0 } else { 1.0 };
     evidence.channels().iter().map(known).collect()
 }
 
 /// Factor on each channel of residuals given clip by clip, one list of values a row.
-#[must_use]
 pub fn weights(evidence: &impl Measured, clips: &[(usize, Vec<f64>)]) -> Vec<f64> {
     let channels = evidence.channels().len();
     (0..channels).map(|channel| weight(evidence, clips, channel)).collect()

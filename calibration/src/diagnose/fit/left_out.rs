@@ -7,7 +7,6 @@ use crate::diagnose::evidence::measured::Evidence;
 use nalgebra::DMatrix;
 
 /// How far the free numbers move to the minimum of a form over (residual, free numbers), within their bounds.
-#[must_use]
 pub(in crate::diagnose) fn shift_to<E: Evidence>(
     bench: &Bench<'_, E>,
     hypothesis: &Hypothesis,
@@ -22,7 +21,6 @@ pub(in crate::diagnose) fn shift_to<E: Evidence>(
 }
 
 /// All numbers without the clips `out`.
-#[must_use]
 pub(in crate::diagnose) fn numbers_without<E: Evidence>(
     bench: &Bench<'_, E>,
     hypothesis: &Hypothesis,

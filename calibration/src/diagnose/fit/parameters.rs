@@ -21,13 +21,11 @@ use twin::effects::{Role, Shape};
 const NINETY: f64 = 1.645;
 
 /// The parameters of one of a hypothesis' effects.
-#[must_use]
 pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {
     of_effect_moved(bench, hypothesis, effect, &[])
 }
 
 /// The same; `time_step`: how far the twin's time step moves each free number, where that is known ([`super::time_step`]).
-#[must_use]
 pub fn of_effect_moved<E: Evidence>(
     bench: &Bench<'_, E>,
     hypothesis: &Hypothesis,

@@ -15,7 +15,6 @@ pub struct Minimum {
 
 /// The form with these rows and columns eliminated at their best, rows and columns of the others as they were (those
 /// eliminated become zero).
-#[must_use]
 pub fn eliminate(form: &DMatrix<f64>, out: &[usize]) -> DMatrix<f64> {
     let Some(inner) = factor(form, out) else { return form.clone() };
     let cross = DMatrix::from_fn(out.len(), form.ncols(), |i, j| form[(out[i], j)]);
@@ -28,7 +27,6 @@ pub fn eliminate(form: &DMatrix<f64>, out: &[usize]) -> DMatrix<f64> {
 }
 
 /// The minimum over the coefficients `free`, the others zero.
-#[must_use]
 pub fn minimum(form: &DMatrix<f64>, free: &[usize]) -> Minimum {
     let Some(inner) = factor(form, free) else { return Minimum { at: vec![0.0; free.len()], gain: 0.0 } };
     let slope = DVector::from_fn(free.len(), |i, _| form[(free[i], 0)]);
@@ -37,7 +35,6 @@ pub fn minimum(form: &DMatrix<f64>, free: &[usize]) -> Minimum {
 }
 
 /// The same where coefficients marked in `one_sided` must not be negative: those that want to be are dropped, worst first.
-#[must_use]
 pub fn bounded_minimum(form: &DMatrix<f64>, free: &[usize], one_sided: &[bool]) -> Minimum {
     let mut kept: Vec<usize> = (0..free.len()).collect();
     loop {
@@ -57,7 +54,6 @@ pub fn bounded_minimum(form: &DMatrix<f64>, free: &[usize], one_sided: &[bool]) 
 }
 
 /// Value of the form at coefficients for the columns `free`.
-#[must_use]
 pub fn value(form: &DMatrix<f64>, free: &[usize], at: &[f64]) -> f64 {
     let full: Vec<(usize, f64)> =
         std::iter::once((0, 1.0)).chain(free.iter().copied().zip(at.iter().copied())).collect();

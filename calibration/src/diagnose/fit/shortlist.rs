@@ -52,7 +52,6 @@ pub fn hold_numbers(form: &mut DMatrix<f64>, columns: &[Column], library: &Libra
 }
 
 /// Scores all candidates of a sweep on the sum of its clips' forms, best first.
-#[must_use]
 pub fn score(swept: &Swept, sum: &DMatrix<f64>, library: &Library) -> Vec<Scored> {
     let mut form = sum.clone();
     hold_numbers(&mut form, &swept.columns, library);
@@ -102,7 +101,6 @@ fn worth(scored: &Scored) -> f64 {
 }
 
 /// Probability that a chi-square of `freedom` exceeds `value` (Wilson and Hilferty 1931: its cube root is nearly normal).
-#[must_use]
 pub fn chance(value: f64, freedom: usize) -> f64 {
     if value <= 0.0 {
         return 1.0;
@@ -115,7 +113,6 @@ pub fn chance(value: f64, freedom: usize) -> f64 {
 
 /// Probability that a standard normal number exceeds `z` (Abramowitz and Stegun 26.2.17, error below 1e-7; beyond z = 6 the
 /// leading term of the asymptotic series).
-#[must_use]
 pub fn upper_tail(z: f64) -> f64 {
     if z < 0.0 {
         return 1.0 - upper_tail(-z);

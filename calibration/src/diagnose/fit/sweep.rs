@@ -55,7 +55,6 @@ pub struct Swept {
     pub columns: Vec<Column>,
     /// What varies from clip to clip.
     pub scatter: Scatter,
-    /// Clips.
     pub clips: Vec<SweptClip>,
 }
 
@@ -73,9 +72,7 @@ pub struct Reduced {
 
 /// Where a sweep stands.
 pub struct Point<'a> {
-    /// All numbers.
     pub full: &'a [f64],
-    /// Free numbers.
     pub free: &'a [usize],
     /// Candidates to probe.
     pub probed: &'a [usize],

@@ -15,7 +15,6 @@ const EXTRAPOLATED: f64 = 4.0 / 3.0;
 
 /// How far each free number of a hypothesis would move; `None` where clips cannot be integrated in other steps, as those with an
 /// object. `weights`: those that it was fitted with.
-#[must_use]
 pub fn error<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
     let clips: Vec<(usize, Vec<f64>)> = hypothesis.fitted.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
     // Asked first: where there is no answer nothing need be linearised.

@@ -12,7 +12,6 @@ const SHARE: f64 = 1e-6;
 const LEAST: f64 = 1.0;
 
 /// The hypothesis with the sizes of its effects on the arm at rest that nothing depends on, and no longer free.
-#[must_use]
 pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hypothesis {
     let mut out = hypothesis.clone();
     for effect in &hypothesis.effects {
@@ -24,7 +23,6 @@ pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hy
 }
 
 /// The sizes of an effect on the arm that nothing depends on.
-#[must_use]
 pub fn sizes<E: Measured>(bench: &Bench<'_, E>, hypothesis: &Hypothesis<E::Own>, effect: usize) -> Vec<usize> {
     let candidate = &bench.library.candidates[effect];
     // Of one number it is known that something depends on it: it was found.

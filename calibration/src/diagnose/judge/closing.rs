@@ -13,7 +13,6 @@ const HARM: f64 = 0.1;
 
 /// How much of the way is gone between two hypotheses on all clips but those for confirming, of the group of sensors in which it is largest; 0
 /// where the gap widens on clips that were not fitted. `whole`: what the baseline leaves.
-#[must_use]
 pub fn closes<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,

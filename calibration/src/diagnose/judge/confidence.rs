@@ -17,7 +17,6 @@ pub const MOST: f64 = 1.0 - NAMED_IS_WRONG.value;
 const TEMPERATURE: f64 = 4.0;
 
 /// Probability of every candidate tried in a step that could be the cause, and what is left for none of them.
-#[must_use]
 pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
     let fitted: Vec<(usize, f64)> = (trials.iter())
         .filter(|trial| trial.is_cause() && !trials.iter().any(|other| other.is_cause() && trial.is_outdone_by(other)))
@@ -34,7 +33,6 @@ pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
 /// that close as much of the gap; with more numbers than the chosen one, markedly more of it. Of one that is known to look alike
 /// it is enough that it closes a cause's share: how much any of the two closes depends on how far their fits have come.
 /// Differences count `overdispersion` times less.
-#[must_use]
 pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64) -> Vec<usize> {
     let of = |candidate: usize| {
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == candidate)?;
@@ -58,7 +56,6 @@ pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64
 }
 
 /// Whether an advantage over a rival could be chance.
-#[must_use]
 pub fn alike(beyond: f64, error: f64, clips: usize) -> bool {
     beyond < NEAR.max(chance(clips) * error)
 }

@@ -17,7 +17,6 @@ const LEAST: f64 = 6.0;
 const FEWEST: usize = 5;
 
 /// How much the friction of the last clip is over that of the first, less 1; `None` where it does not drift.
-#[must_use]
 pub fn of_friction(scatter: &Scatter, hypothesis: &Hypothesis) -> Option<f64> {
     let name = Own::LnFriction.name();
     let number = scatter.random.iter().position(|random| random.name == name)?;

@@ -10,7 +10,6 @@ const AT_AN_END: f64 = 1e-3;
 
 /// Sizes of a candidate, among all numbers `full`, that stopped at an end of their search away from where it began: the parameter and
 /// which of its values.
-#[must_use]
 pub(crate) fn stopped(library: &Library, candidate: usize, full: &[f64]) -> Vec<(&'static str, usize)> {
     let at_an_end = |k: usize| {
         let unknown = &library.unknowns[k];

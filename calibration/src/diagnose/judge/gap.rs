@@ -60,13 +60,11 @@ fn place(group: Group) -> usize {
 
 impl Residuals {
     /// Of clips at the numbers of a hypothesis.
-    #[must_use]
     pub fn at<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, clips: &[usize]) -> Option<Self> {
         Self::each(bench, &clips.iter().map(|clip| (*clip, &hypothesis.full[..])).collect::<Vec<_>>())
     }
 
     /// Of clips that were not fitted, each at its own numbers.
-    #[must_use]
     pub fn of<E: Evidence>(bench: &Bench<'_, E>, fits: &[(Hypothesis, Vec<usize>)]) -> Option<Self> {
         let clips = fits.iter().flat_map(|(fit, clips)| clips.iter().map(|clip| (*clip, &fit.full[..])));
         Self::each(bench, &clips.collect::<Vec<_>>())
@@ -89,20 +87,17 @@ impl Residuals {
     }
 
     /// What noise and the scatter between clips alone would leave of [`Self::mean_square`].
-    #[must_use]
     pub fn floor(&self) -> f64 {
         mean(&self.floors, &(0..self.clips.len()).collect::<Vec<_>>())
     }
 
     /// Of every group of sensors, the geometric mean over clips of their mean squares: one stroke that went its own way
     /// decides little, and a cause that shows in some clips only is seen.
-    #[must_use]
     pub fn typical(&self) -> Vec<Typical> {
         SAID.into_iter().filter_map(|group| self.typical_of(group)).collect()
     }
 
     /// The same of one group; `None` where no clip has any of it.
-    #[must_use]
     pub fn typical_of(&self, group: Group) -> Option<Typical> {
         let usual = |sums: &[Vec<(f64, f64)>]| {
             let of_group = sums.iter().filter_map(|clip| clip.get(place(group)));
@@ -115,13 +110,11 @@ impl Residuals {
     }
 
     /// Mean square: the mean over the groups of sensors, so that a thousand encoder rows do not drown the object.
-    #[must_use]
     pub fn mean_square(&self) -> f64 {
         mean(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
     }
 
     /// In how many clips the mean square is smaller than `before`, and how many clips there are.
-    #[must_use]
     pub fn clips_that_shrink(&self, before: &Self) -> [usize; 2] {
         let falls = |clip: &usize| mean(&self.sums, &[*clip]) < mean(&before.sums, &[*clip]);
         [(0..self.clips.len()).filter(falls).count(), self.clips.len()]
@@ -129,14 +122,12 @@ impl Residuals {
 
     /// The shrink `1 - after / before` of the mean square from `before` to this, with an interval from drawing clips anew,
     /// or pieces of them where there are few.
-    #[must_use]
     pub fn shrink(&self, before: &Self, seed: u64) -> Share {
         self.shrink_added(before, before, seed)
     }
 
     /// What a step from `from` to this adds to the shrink: `(from - after) / before`. Steps that follow each other add up to
     /// the shrink of the whole. At least [`DOUBLED`].
-    #[must_use]
     pub fn shrink_added(&self, from: &Self, before: &Self, seed: u64) -> Share {
         let of = |drawn: &[usize]| {
             let [from, after, before] = [from, self, before].map(|residuals| mean(&residuals.pieces, drawn));

@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 const LEAST: f64 = 0.005;
 
 /// Cells, largest first. A residual's noise alone would square to 1.
-#[must_use]
 pub fn localise(evidence: &impl Evidence, residuals: &Residuals) -> Vec<Place> {
     let mut cells: BTreeMap<(String, String, &'static str), f64> = BTreeMap::new();
     for (clip, residuals) in &residuals.clips {

@@ -38,7 +38,6 @@ pub struct Left {
 
 impl Left {
     /// Of every group of sensors, in a clip like most.
-    #[must_use]
     pub fn of_groups(before: &[Typical], after: &[Typical]) -> Vec<Self> {
         let one = |(before, after): (&Typical, &Typical)| Self {
             before: before.mean_square,
@@ -56,7 +55,6 @@ impl Left {
     }
 
     /// For diagnosis.json, of every group of sensors.
-    #[must_use]
     pub fn of_all_sensors(before: &[Typical], after: &[Typical]) -> Vec<SensorGap> {
         Self::of_groups(before, after).iter().map(Self::of_sensors).collect()
     }
@@ -67,26 +65,22 @@ impl Left {
     }
 
     /// The gap of the twin without any effect beyond the noise, in least gaps: of 1 on it is a gap.
-    #[must_use]
     pub fn gaps(&self) -> f64 {
         (self.before - self.floor) / if self.of_object { OBJECT_EXCESS.value } else { JOINTS_EXCESS.value }
     }
 
     /// Whether the gap of the twin without any effect is so large that a substitute for its cause does not close it.
-    #[must_use]
     pub fn is_plain(&self) -> bool {
         self.before - self.floor > if self.of_object { PLAIN_IN_OBJECT } else { PLAIN_IN_JOINTS }
     }
 
     /// How likely it is that nothing is there where no cause is seen.
-    #[must_use]
     pub fn is_nothing(&self) -> f64 {
         1.0 / (1.0 + ((self.gaps() - DOUBTFUL.value) / TURNS_WITHIN.value).exp())
     }
 
     /// Whether something structured remains that is no numerics. `clear`: what was found stood out so much that it is
     /// believed although it leaves a rough hit rough.
-    #[must_use]
     pub fn too_much(&self, clear: bool) -> bool {
         let excess = self.after - self.floor;
         let substitute = if clear && self.of_object { MOST_OF_IT } else { self.substitute };
@@ -94,14 +88,12 @@ impl Left {
     }
 
     /// Share of the excess that is explained.
-    #[must_use]
     pub fn explained(&self) -> f64 {
         explained(self.before, self.after, self.floor)
     }
 }
 
 /// Share of what a gap has beyond the noise that is explained.
-#[must_use]
 pub fn explained(before: f64, after: f64, floor: f64) -> f64 {
     let excess = before - floor;
     if excess <= 0.0 { 0.0 } else { ((before - after) / excess).clamp(0.0, 1.0) }
@@ -113,7 +105,6 @@ const BEYOND: f64 = 0.05;
 
 /// Effects of a hypothesis that are stronger than what is met in practice, whatever of their intervals is true: what stopped at an
 /// end of its search is at least as strong as that.
-#[must_use]
 pub fn implausible<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<usize> {
     let beyond = |effect: &usize| {
         let sizes = parameters::of_effect(bench, hypothesis, *effect);

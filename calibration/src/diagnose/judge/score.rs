@@ -43,7 +43,6 @@ const DOUBTED: f64 = 100.0;
 const MOST_TIMES: f64 = 6.0;
 
 /// Predicts training and choosing clips.
-#[must_use]
 pub fn predict<E: Evidence>(
     bench: &Bench<'_, E>,
     hypothesis: &Hypothesis,
@@ -58,7 +57,6 @@ pub fn predict<E: Evidence>(
 }
 
 /// Predicts clips by numbers that were fitted to others.
-#[must_use]
 pub(in crate::diagnose) fn predict_unseen<E: Evidence>(
     bench: &Bench<'_, E>,
     fits: &Fits,
@@ -107,13 +105,11 @@ fn simulated<E: Evidence>(
 
 impl Predicted {
     /// Sum of the deviances.
-    #[must_use]
     pub fn deviance(&self) -> f64 {
         self.clips.iter().map(|(_, deviance)| deviance).sum()
     }
 
     /// What this hypothesis is worth over another on the same clips.
-    #[must_use]
     pub fn over(&self, other: &Self) -> Advantage {
         let mut gains: Vec<f64> = self.clips.iter().zip(&other.clips).map(|((_, a), (_, b))| 0.5 * (b - a)).collect();
         let most = (OUTSTANDING * median(gains.iter().map(|gain| gain.abs())).unwrap_or(0.0)).max(LEAST);
@@ -126,14 +122,12 @@ impl Predicted {
 
 impl Advantage {
     /// How many clips judged.
-    #[must_use]
     pub fn clips(&self) -> usize {
         self.gains.len()
     }
 
     /// How many clips more would make it twice its error, gaining as those at hand do; `None` where more would prove nothing, at
     /// most as many as there are five times over, or it is proven.
-    #[must_use]
     pub fn clips_more(&self) -> Option<usize> {
         if self.nats <= 0.0 || self.nats > 2.0 * self.error {
             return None;
@@ -146,7 +140,6 @@ impl Advantage {
 
     /// By how much more this is worth than another on the same clips, and the standard error of that from the scatter of the
     /// difference between clips [nats]: what two hypotheses gain alike on a clip says nothing about which is right.
-    #[must_use]
     pub fn beyond(&self, other: &Self) -> (f64, f64) {
         sum(&self.gains.iter().zip(&other.gains).map(|(a, b)| a - b).collect::<Vec<_>>())
     }

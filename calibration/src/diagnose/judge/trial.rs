@@ -50,7 +50,6 @@ pub struct Trial {
 
 impl Trial {
     /// Whether enough of the gap closes with it for a cause, however much better the clips are predicted.
-    #[must_use]
     pub fn is_cause(&self) -> bool {
         self.closes > CLOSES
     }
@@ -61,7 +60,6 @@ impl Trial {
     }
 
     /// Whether another does the same with fewer numbers: what is better about this one is no more than engines differ by.
-    #[must_use]
     pub fn is_outdone_by(&self, other: &Self) -> bool {
         let (Some((_, mine)), Some((_, its))) = (&self.fitted, &other.fitted) else { return false };
         let alike = mine.nats - its.nats < LEAST.max(OWN_SHARE * its.nats);
@@ -70,7 +68,6 @@ impl Trial {
 
     /// Whether it closes so much more of the gap that its additional numbers are worth it although clips are predicted as well
     /// without them.
-    #[must_use]
     pub fn closes_more_than(&self, other: &Self) -> bool {
         self.own_numbers && self.closes > other.closes + MORE
     }
@@ -108,7 +105,6 @@ impl Found {
     /// For every step, how many times what the search left of an arm's clips exceeds what was taken for noise in it, at least
     /// 1: so many times less do differences between candidates say. Weights come from slopes, with all candidates at once; a
     /// real arm deviates far more under all that is named. Clips with numbers of their own take that up.
-    #[must_use]
     pub fn overdispersion<E: Evidence>(&self, bench: &Bench<'_, E>) -> Vec<f64> {
         let clips: Vec<usize> = self.last.fitted.iter().map(|clip| clip.clip).collect();
         let left = (bench.scatter.count() == 0).then(|| Residuals::at(bench, &self.last, &clips)).flatten();
@@ -131,21 +127,18 @@ impl Found {
 }
 
 /// Whether an advantage is enough for `cost` more numbers.
-#[must_use]
 pub fn convincing(advantage: &Advantage, cost: usize) -> bool {
     let price = LEAST.max(cost as f64);
     advantage.nats > price && advantage.nats > 2.0 * advantage.error && advantage.share > 0.5
 }
 
 /// Advantage less what numbers gain by chance: what trials are ranked by.
-#[must_use]
 pub fn net(advantage: &Advantage, cost: usize) -> f64 {
     advantage.nats - 0.5 * cost as f64
 }
 
 impl Step {
     /// The trial that is worth most among those worth it.
-    #[must_use]
     pub fn best<E: Evidence>(&self, bench: &Bench<'_, E>) -> Option<(&Trial, &Hypothesis, &Advantage)> {
         let convincing_ones: Vec<(&Trial, &Hypothesis, &Advantage)> = (self.trials.iter())
             .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
@@ -194,7 +187,6 @@ impl Step {
     }
 
     /// Whether a trial stands out: nearly all clips speak for it, far beyond chance, and for no other effect half as much.
-    #[must_use]
     pub fn is_clear(&self, library: &Library, candidate: usize) -> bool {
         let own = self.trials.iter().find(|trial| trial.scored.candidate == candidate);
         let advantage = own.and_then(|trial| trial.fitted.as_ref()).map(|(_, advantage)| advantage);
@@ -204,7 +196,6 @@ impl Step {
 
     /// Whether a trial leads: as clear as one that stands out, and ahead of every other cause that does not look like it, by half of
     /// what it is worth, or by a fifth and clip by clip far beyond chance.
-    #[must_use]
     pub fn leads(&self, library: &Library, candidate: usize) -> bool {
         let Some(trial) = self.trials.iter().find(|trial| trial.scored.candidate == candidate) else { return false };
         let Some((_, own)) = trial.fitted.as_ref() else { return false };

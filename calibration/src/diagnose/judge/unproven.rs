@@ -9,7 +9,6 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 pub(in crate::diagnose) struct Unproven<'a> {
     /// The trial of it.
     pub(in crate::diagnose) trial: &'a Trial,
-    /// Its fit.
     pub(in crate::diagnose) fit: &'a Hypothesis,
     /// How many clips judged.
     pub(in crate::diagnose) clips: usize,
@@ -18,7 +17,6 @@ pub(in crate::diagnose) struct Unproven<'a> {
 }
 
 impl Unproven<'_> {
-    /// Its name.
     pub(in crate::diagnose) fn effect<E>(&self, bench: &Bench<'_, E>) -> &'static str {
         bench.library.candidates[self.trial.scored.candidate].effect.name
     }

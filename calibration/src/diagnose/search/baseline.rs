@@ -26,13 +26,11 @@ const LAST: Effort = Effort::of(8, Precision::Exact);
 const TOGETHER: Effort = Effort::of(8, Precision::Joints);
 
 /// Steps in which [`identify`] shows how far it is.
-#[must_use]
 pub fn steps(admitted: &Admitted) -> u64 {
     if admitted.with_object { 4 } else { 2 }
 }
 
 /// Identifies; `None` when the twin has no answer at the nominal parameters.
-#[must_use]
 pub fn identify<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
@@ -84,7 +82,6 @@ fn start<E: Evidence>(bench: &Bench<'_, E>, split: &Split, cell: &Cell, admitted
 
 /// Numbers with the object's parameters that fit the strokes best under the arm and the effects that are given, by
 /// identification's own way over rough hits; `None` where strokes tell nothing about the object.
-#[must_use]
 pub fn refined<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,

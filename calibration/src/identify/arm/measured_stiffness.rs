@@ -37,7 +37,6 @@ type Sums = Vec<(DMatrix<f64>, DVector<f64>)>;
 
 /// The cell with the stiffness that its clips' torques say, joint by joint, as nominal values and ranges, and a sentence about it;
 /// `None` where cell.toml states the stiffness, clips hold no torques, or those of no joint tell.
-#[must_use]
 pub(super) fn found(cell: &Cell, clips: &[Clip]) -> Option<(Cell, String)> {
     let controller = cell.controller.as_ref()?;
     let ranged = controller.stiffness_range.is_some() || controller.stiffness.is_empty();

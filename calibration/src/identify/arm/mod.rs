@@ -74,13 +74,11 @@ pub struct Options {
 /// The arm cannot be identified.
 #[derive(Debug, thiserror::Error)]
 pub enum ArmError {
-    /// The session.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The parameters that are known already.
     #[error(transparent)]
     Theta(#[from] TomlFileError),
-    /// The cell.
     #[error(transparent)]
     Base(#[from] BaseError),
     /// The arm's model.
@@ -100,12 +98,10 @@ pub enum ArmError {
     /// Nothing can be used.
     #[error("{session}: no clip can be used for the arm: {why}")]
     NoClip {
-        /// The session.
         session: String,
         /// Reasons, clip by clip.
         why: String,
     },
-    /// The search.
     #[error(transparent)]
     Run(#[from] RunError),
     /// The answer cannot be written.

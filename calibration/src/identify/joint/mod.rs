@@ -67,7 +67,6 @@ pub struct Options {
 /// The joint cannot be identified.
 #[derive(Debug, thiserror::Error)]
 pub enum JointError {
-    /// The session.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The joint, or its part.
@@ -76,9 +75,7 @@ pub enum JointError {
     /// There is nothing to identify.
     #[error("no clip of {session} shows `{part}` move by itself: {why}")]
     NoMotion {
-        /// The session.
         session: String,
-        /// The part.
         part: String,
         /// Why not, and what helps.
         why: String,
@@ -94,7 +91,6 @@ pub enum JointError {
     /// The URDF cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// Ctrl-C.
     #[error("interrupted; it takes seconds, and the same command begins anew")]
     Interrupted,
 }

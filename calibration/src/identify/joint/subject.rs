@@ -12,7 +12,6 @@ use twin::scene::start_of;
 pub(super) struct Subject {
     /// The object's name.
     pub(super) object: String,
-    /// The joint.
     pub(super) joint: UrdfJoint,
     /// What moves on it, in its link's frame: the link, and what hangs on it where the simulated cell starts.
     pub(super) part: MassProperties,

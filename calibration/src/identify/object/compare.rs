@@ -40,7 +40,6 @@ pub struct Comparison {
 /// One way of searching.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Method {
-    /// Its name.
     pub name: String,
     /// What it found.
     pub parameters: BTreeMap<String, f64>,
@@ -233,7 +232,6 @@ const COLUMN: usize = 34;
 impl Comparison {
     /// Three tables: ADD and ADD-S on clips held out, a row a clip and their mean, a column a way of searching; and what
     /// each way cost.
-    #[must_use]
     pub fn table(&self) -> String {
         let mut out = String::new();
         self.errors(&mut out, "ADD", |figures| figures.object_add_m, |clip| clip.1);

@@ -47,7 +47,6 @@ const ROWS_ALIKE: f64 = 5.0;
 const LEAST_JOINT_ERROR: f64 = 2e-5;
 
 /// Clips that are usually simulated until the end: for a bar alone.
-#[must_use]
 pub(super) fn usual_evaluations(clips: &ObjectClips, unknowns: &[Unknown]) -> usize {
     (2 * (FIRST_STEPS + ROUNDS) * (2 + unknowns.len()) + points(unknowns.len())) * clips.clips()
 }

@@ -93,13 +93,11 @@ pub struct Options {
 /// The object cannot be identified.
 #[derive(Debug, thiserror::Error)]
 pub enum ObjectError {
-    /// The session.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The parameters that are known already.
     #[error(transparent)]
     Theta(#[from] TomlFileError),
-    /// The cell.
     #[error(transparent)]
     Base(#[from] BaseError),
     /// The arm's model.
@@ -123,12 +121,10 @@ pub enum ObjectError {
     /// Nothing can be used.
     #[error("{session}: no clip can be used for the object: {why}")]
     NoClip {
-        /// The session.
         session: String,
         /// Reasons, clip by clip.
         why: String,
     },
-    /// The search.
     #[error(transparent)]
     Run(#[from] RunError),
     /// The twin has no answer.

@@ -16,7 +16,6 @@ use inference::statistics::student;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
 
-/// Parts.
 const PARTS: usize = 4;
 /// Fewer clips make no part.
 const LEAST: usize = 4;

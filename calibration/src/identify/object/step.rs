@@ -16,7 +16,6 @@ use serde::{Deserialize, Serialize};
 /// What is asked of the clips.
 #[derive(Clone, Copy)]
 pub(super) struct Question<'a> {
-    /// The clips.
     pub(super) clips: &'a ObjectClips,
     /// The shared numbers.
     pub(super) unknowns: &'a [Unknown],
@@ -54,19 +53,16 @@ const MISFIT: f64 = 4.0;
 
 impl Linearised {
     /// `-2 ln` of the likelihood of all clips.
-    #[must_use]
     pub(super) fn deviance(&self) -> f64 {
         self.clips.iter().zip(&self.weights).map(|(clip, weight)| weight * clip.deviance).sum()
     }
 
     /// The clips' own numbers.
-    #[must_use]
     pub(super) fn own(&self) -> Vec<Vec<f64>> {
         self.clips.iter().map(|clip| clip.own.clone()).collect()
     }
 
     /// Information on the shared numbers.
-    #[must_use]
     pub(super) fn information(&self) -> DMatrix<f64> {
         let n = self.shared.len();
         let parts = self.clips.iter().zip(&self.weights);
@@ -75,7 +71,6 @@ impl Linearised {
 
     /// The estimate of the shared numbers to first order: the clips as much as each counts, wanting what they would want
     /// had they been left out; which numbers rest on a bound; how sure the others are.
-    #[must_use]
     pub(super) fn estimate(&self, unknowns: &[Unknown]) -> (Fit, Vec<bool>, Intervals) {
         let mut clips = self.clips.clone();
         for (clip, weight) in clips.iter_mut().zip(&self.weights) {

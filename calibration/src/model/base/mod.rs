@@ -36,7 +36,6 @@ use twin::xml::Element;
 /// The user's model.
 #[derive(Debug, Clone, Copy)]
 pub struct Base<'a> {
-    /// Its file.
     pub file: &'a Path,
     /// Its joints that are the cell's, from base to flange; empty where the names tell.
     pub joints: &'a [String],

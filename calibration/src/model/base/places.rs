@@ -16,7 +16,6 @@ const FLAT: f64 = 1e-3;
 pub(super) struct PlacedJoint {
     /// A point of its axis [m].
     pub(super) point: Vector3<f64>,
-    /// Its direction.
     pub(super) axis: Vector3<f64>,
     /// The frame of the body that it moves.
     pub(super) body: Isometry3<f64>,

@@ -11,7 +11,6 @@ use std::collections::BTreeMap;
 pub(crate) struct Row<'a> {
     /// What it is.
     pub(crate) name: &'a str,
-    /// SI unit.
     pub(crate) unit: &'a str,
     /// Values in the order of the classes.
     pub(crate) values: Vec<f64>,

@@ -11,9 +11,7 @@ pub(crate) struct Bin {
     pub(crate) confidence: f64,
     /// Share of them that were true.
     pub(crate) right: f64,
-    /// Its interval.
     pub(crate) interval: [f64; 2],
-    /// How many.
     pub(crate) count: usize,
 }
 

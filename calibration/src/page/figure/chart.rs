@@ -11,7 +11,6 @@ const LEFT: f64 = 62.0;
 const TOP: f64 = 24.0;
 const BOTTOM: f64 = 36.0;
 
-/// A line.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Line<'a> {
     /// Colour: `before`, `after`, `data`.
@@ -20,12 +19,9 @@ pub(crate) struct Line<'a> {
     pub(crate) points: &'a [[f64; 2]],
 }
 
-/// A chart.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Chart<'a> {
-    /// Above it.
     pub(crate) title: &'a str,
-    /// Below it.
     pub(crate) x: &'a str,
     /// SI unit of the values.
     pub(crate) unit: &'a str,

@@ -10,20 +10,15 @@ use maud::Markup;
 pub(crate) struct Group<'a> {
     /// What they are.
     pub(crate) name: &'a str,
-    /// SI unit.
     pub(crate) unit: &'a str,
-    /// The parameters.
     pub(crate) rows: Vec<Row>,
 }
 
-/// One number.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Row {
     /// Which of them.
     pub(crate) name: String,
-    /// Value found.
     pub(crate) value: f64,
-    /// Its interval.
     pub(crate) interval: [f64; 2],
     /// What cell.toml says.
     pub(crate) nominal: Option<f64>,

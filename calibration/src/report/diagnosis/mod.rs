@@ -17,8 +17,6 @@ use maud::{Markup, html};
 /// Clips whose residuals are shown.
 const SHOWN_CLIPS: usize = 3;
 
-/// The page.
-#[must_use]
 pub fn page(diagnosis: &Diagnosis) -> String {
     let body = html! {
         (head(diagnosis))

@@ -5,7 +5,6 @@ use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 use shared_mem::hand_eye::{HandEye, Mount, MountedPose};
 
-/// The answer.
 #[derive(Debug, Clone, Serialize)]
 pub struct Answer {
     /// What goes into the file.
@@ -26,11 +25,9 @@ pub struct Answer {
 /// What became of a picture.
 #[derive(Debug, Clone, Serialize)]
 pub struct ViewAnswer {
-    /// Its name.
     pub name: String,
     /// Whether it took part.
     pub used: bool,
-    /// Corners seen.
     pub corners: usize,
     /// Root mean square of the corners with the arm's pose as it was said [pixel]; absent where the picture fixes no board.
     pub reprojection_px: Option<f64>,
@@ -64,7 +61,6 @@ fn axis(of: &Vector3<f64>) -> String {
 }
 
 /// What is open, in words.
-#[must_use]
 pub fn not_identifiable(open: &Open, fit: &Fit) -> NotIdentifiable {
     let part = |from: usize| Vector3::new(open.direction[from], open.direction[from + 1], open.direction[from + 2]);
     let (turn, shift) = (part(0), part(3));
@@ -95,7 +91,6 @@ pub fn not_identifiable(open: &Open, fit: &Fit) -> NotIdentifiable {
 }
 
 /// The mount with its intervals.
-#[must_use]
 pub fn mounted(fit: &Fit) -> MountedPose {
     let pose: &Isometry3<f64> = &fit.chain.camera;
     let of = |k: usize| {
@@ -111,7 +106,6 @@ pub fn mounted(fit: &Fit) -> MountedPose {
 
 impl Answer {
     /// The answer for people.
-    #[must_use]
     pub fn in_words(&self) -> String {
         let (name, pose) = match &self.hand_eye {
             HandEye { EE_T_camera: Some(pose), .. } => ("camera in the end effector's frame (EE_T_camera)", pose),

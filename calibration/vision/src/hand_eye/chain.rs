@@ -22,7 +22,6 @@ pub struct Chain {
 }
 
 /// What the arm says of a picture: `M`.
-#[must_use]
 pub fn link(mount: Mount, base_from_end_effector: &Isometry3<f64>) -> Isometry3<f64> {
     match mount {
         Mount::EyeInHand => base_from_end_effector.inverse(),
@@ -56,19 +55,16 @@ impl Chain {
     }
 
     /// The board in the camera's frame if the arm's pose is as it says.
-    #[must_use]
     pub fn camera_from_board(&self, link: &Isometry3<f64>) -> Isometry3<f64> {
         self.camera.inverse() * link * self.board
     }
 
     /// The same if the end effector is off by `error`: turned [rad] about its origin, then shifted [m].
-    #[must_use]
     pub fn camera_from_board_with(&self, link: &Isometry3<f64>, error: &Vector6<f64>) -> Isometry3<f64> {
         self.camera.inverse() * about(&self.pivot(link), error) * link * self.board
     }
 
     /// The arm's error that explains a board's pose whole.
-    #[must_use]
     pub fn error_of(&self, link: &Isometry3<f64>, camera_from_board: &Isometry3<f64>) -> Vector6<f64> {
         let pivot = Translation3::from(self.pivot(link));
         let moved = self.camera * camera_from_board * self.board.inverse() * link.inverse();
@@ -79,7 +75,6 @@ impl Chain {
     }
 
     /// How the board moves in the camera's frame with an error of the arm.
-    #[must_use]
     pub fn error_slopes(&self, link: &Isometry3<f64>) -> Matrix6<f64> {
         let camera_from_mount = self.camera.inverse();
         let pivot = camera_from_mount * nalgebra::Point3::from(self.pivot(link));
@@ -88,7 +83,6 @@ impl Chain {
 
     /// How it moves with the twelve numbers: the mount's turn about the camera's origin and its shift, along the axes of the frame it
     /// is mounted in; the board's turn about its origin and its shift, along the axes of the frame it lies in.
-    #[must_use]
     pub fn slopes(&self, link: &Isometry3<f64>) -> Slopes {
         let camera_from_mount = self.camera.inverse();
         let turn = camera_from_mount.rotation.to_rotation_matrix();
@@ -101,7 +95,6 @@ impl Chain {
     }
 
     /// After a step of the twelve numbers.
-    #[must_use]
     pub fn stepped(&self, by: &Twelve) -> Self {
         let moved = |pose: &Isometry3<f64>, by: Vector6<f64>| about(&pose.translation.vector, &by) * pose;
         Self {

@@ -21,7 +21,6 @@ const ASTRAY: f64 = 8.0;
 const SMALL: f64 = 2e-3;
 
 /// The camera's mount from all pairs of pictures; `None` where no two turn against each other.
-#[must_use]
 pub fn mount(pictures: &[&Pair]) -> Option<Isometry3<f64>> {
     let pairs = (0..pictures.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
     let pairs: Vec<(Isometry3<f64>, Isometry3<f64>)> = pairs
@@ -74,7 +73,6 @@ fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
 
 /// Mount and board from the pictures that fit one another, and which these are; `None` for fewer than three pictures or
 /// where no two turn against each other.
-#[must_use]
 pub fn start(mount_kind: Mount, pictures: &[Pair]) -> Option<(Chain, Vec<bool>)> {
     let count = pictures.len();
     if count < 3 {

@@ -13,7 +13,6 @@ use shared_mem::hand_eye::Mount;
 /// Mount and board from a set of pictures.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The answer.
     pub chain: Chain,
     /// Covariance of the mount: turn about the camera's origin [rad], then shift [m], axes of the frame it is mounted in.
     pub covariance: Matrix6<f64>,

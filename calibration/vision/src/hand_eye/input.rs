@@ -45,11 +45,9 @@ pub struct Source {
 /// Pictures that show the board, those that do not, and the camera.
 #[derive(Debug, Clone)]
 pub struct Taken {
-    /// The pictures.
     pub views: Vec<View>,
     /// Names of pictures that do not show it.
     pub without_board: Vec<String>,
-    /// The camera.
     pub camera: CalibratedCamera,
     /// What was chosen where the files leave it open.
     pub remarks: Vec<String>,

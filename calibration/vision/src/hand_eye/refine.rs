@@ -10,7 +10,6 @@ use nalgebra::{Isometry3, Vector6};
 /// A picture with what does not change from step to step.
 #[derive(Debug, Clone)]
 pub struct Prepared<'a> {
-    /// The picture.
     pub view: &'a View,
     /// What the arm says: `M`.
     pub link: Isometry3<f64>,
@@ -23,7 +22,6 @@ pub struct Prepared<'a> {
 /// Mount and board, and how sure they are.
 #[derive(Debug, Clone)]
 pub struct Refined {
-    /// The answer.
     pub chain: Chain,
     /// Information on the twelve numbers there.
     pub information: Information,
@@ -33,7 +31,6 @@ pub struct Refined {
     pub observations: Vec<Observation>,
 }
 
-/// Most steps.
 const STEPS: usize = 40;
 /// A step less than this is none, in sigmas.
 const ARRIVED: f64 = 1e-4;
@@ -54,7 +51,6 @@ impl Prepared<'_> {
     }
 
     /// Prepared as a picture is.
-    #[must_use]
     pub fn new<'a>(view: &'a View, chain_mount: shared_mem::hand_eye::Mount, board: Isometry3<f64>) -> Prepared<'a> {
         let weights = vec![1.0; view.seen.len()];
         Prepared { view, link: link(chain_mount, &view.base_from_end_effector), board, weights }
@@ -62,7 +58,6 @@ impl Prepared<'_> {
 }
 
 /// The answer from a start; `pixel` is one sigma of a corner along a row and along a column.
-#[must_use]
 pub fn refined(pictures: &[&Prepared<'_>], start: &Chain, pixel: f64) -> Option<Refined> {
     let mut chain = *start;
     let mut errors: Vec<Vector6<f64>> = pictures.iter().map(|p| chain.error_of(&p.link, &p.board)).collect();
@@ -92,7 +87,6 @@ pub fn refined(pictures: &[&Prepared<'_>], start: &Chain, pixel: f64) -> Option<
 impl Refined {
     /// Squared length of what a picture leaves, in sigmas: of one that took part with what it has pulled to its side taken out, of
     /// one that did not with the answer's own uncertainty. Six degrees of freedom.
-    #[must_use]
     pub fn distance(&self, seen: &Observation, took_part: bool) -> Option<f64> {
         let all = self.sigma.with(&seen.noise);
         let weight = all.cholesky()?.inverse();
@@ -110,13 +104,11 @@ impl Refined {
     }
 
     /// What a picture says about the answer that it had no part in.
-    #[must_use]
     pub fn observation(&self, picture: &Prepared<'_>, pixel: f64) -> Option<Observation> {
         picture.observation(&self.chain, &self.chain.error_of(&picture.link, &picture.board), pixel)
     }
 
     /// Mount and board without one of the pictures, to first order.
-    #[must_use]
     pub fn without(&self, seen: &Observation) -> Option<Chain> {
         let weight = self.sigma.with(&seen.noise).cholesky()?.inverse();
         let others = self.information - seen.slopes.transpose() * weight * seen.slopes;

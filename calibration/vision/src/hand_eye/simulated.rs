@@ -14,7 +14,6 @@ use shared_mem::hand_eye::Mount;
 pub struct World {
     /// Who holds the camera.
     pub mount: Mount,
-    /// Pictures.
     pub views: usize,
     /// One sigma of a corner along a row [pixel].
     pub pixel: f64,
@@ -87,7 +86,6 @@ impl World {
 }
 
 /// The six numbers by which a mount is off the truth, as intervals count them: turn [rad], shift [m].
-#[must_use]
 pub fn off(found: &Isometry3<f64>, truth: &Isometry3<f64>) -> [f64; 6] {
     let turn = (found.rotation * truth.rotation.inverse()).scaled_axis();
     let shift = found.translation.vector - truth.translation.vector;

@@ -34,14 +34,12 @@ pub type Information = SMatrix<f64, 12, 12>;
 
 impl ArmSigma {
     /// Covariance of one picture's error with its noise.
-    #[must_use]
     pub fn with(&self, noise: &Matrix6<f64>) -> Matrix6<f64> {
         let (r, p) = (self.rotation.powi(2), self.position.powi(2));
         noise + Matrix6::from_diagonal(&Vector6::new(r, r, r, p, p, p))
     }
 
     /// The most likely one, from `self` on.
-    #[must_use]
     pub fn most_likely(self, observations: &[Observation]) -> Self {
         let clamp = |v: f64| v.clamp(*RANGE.start(), *RANGE.end());
         let (mut best, mut step) = (self, 1.5_f64);
@@ -65,7 +63,6 @@ impl ArmSigma {
 }
 
 /// Information and right side of the normal equations for a step of the twelve numbers; `None` where a covariance is none.
-#[must_use]
 pub fn normal_equations(observations: &[Observation], sigma: &ArmSigma) -> Option<(Information, Twelve)> {
     let mut information = Information::identity() / (BEFOREHAND * BEFOREHAND);
     let mut right = Twelve::zeros();

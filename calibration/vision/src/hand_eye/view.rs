@@ -13,7 +13,6 @@ pub struct View {
     pub base_from_end_effector: Isometry3<f64>,
     /// Corners of the board: where in its plane [m], where in the picture without distortion [pixel].
     pub seen: Vec<Seen>,
-    /// The camera.
     pub lens: Lens,
 }
 
@@ -34,7 +33,6 @@ const MEDIAN_LENGTH: f64 = 1.177;
 
 impl View {
     /// Lengths of what is left of each corner [pixel]; infinite for those behind the camera.
-    #[must_use]
     pub fn residuals(&self, camera_from_board: &Isometry3<f64>) -> Vec<f64> {
         let off = |seen: &Seen| {
             let at = camera_from_board * Point3::new(seen.place[0], seen.place[1], 0.0);
@@ -45,7 +43,6 @@ impl View {
     }
 
     /// Their root mean square, without corners that weigh less than whole.
-    #[must_use]
     pub fn rms(&self, camera_from_board: &Isometry3<f64>, weights: &[f64]) -> f64 {
         let pairs = self.residuals(camera_from_board).into_iter().zip(weights);
         let (sum, count) = pairs.filter(|(_, w)| **w >= 1.0).fold((0.0, 0), |(sum, n), (r, _)| (sum + r * r, n + 1));
@@ -53,7 +50,6 @@ impl View {
     }
 
     /// The weights of corners whose residuals have this sigma along a row and along a column [pixel].
-    #[must_use]
     pub fn weights(&self, camera_from_board: &Isometry3<f64>, sigma: f64) -> Vec<f64> {
         let weight = |off: f64| (HUBER * sigma / off.max(1e-12)).min(1.0);
         self.residuals(camera_from_board).into_iter().map(weight).collect()
@@ -61,7 +57,6 @@ impl View {
 
     /// The equations at a pose of the board, for moves of it in the camera's frame: turn about the camera's origin, then shift;
     /// `None` where a corner lies behind the camera.
-    #[must_use]
     pub fn equations(&self, camera_from_board: &Isometry3<f64>, weights: &[f64]) -> Option<Equations> {
         let (mut gradient, mut information) = (Vector6::zeros(), Matrix6::zeros());
         for (seen, weight) in self.seen.iter().zip(weights) {
@@ -85,7 +80,6 @@ impl View {
 
     /// The board in the camera's frame by this picture alone, robust against single wrong corners, and sigma of the corners [pixel];
     /// `None` for fewer than six corners or those of one row.
-    #[must_use]
     pub fn board(&self) -> Option<(Isometry3<f64>, f64)> {
         if self.seen.len() < 6 {
             return None;
@@ -107,7 +101,6 @@ impl View {
 }
 
 /// A board's pose after a small move as the camera sees it: turn about the camera's origin, then shift.
-#[must_use]
 pub fn moved(camera_from_board: &Isometry3<f64>, by: &Vector6<f64>) -> Isometry3<f64> {
     crate::viewpoint::step::moved(camera_from_board, &Point3::origin(), by)
 }

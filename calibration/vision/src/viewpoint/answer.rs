@@ -19,7 +19,6 @@ pub struct Viewpoint {
     pub rival: Option<f64>,
     /// The start, and how far it was from the answer; absent for a search.
     pub start: Option<Start>,
-    /// The pictures.
     pub frames: Vec<FrameAnswer>,
     /// `outline` or `swarm`.
     pub method: &'static str,
@@ -45,7 +44,6 @@ pub struct Pose {
 /// The pose that was started from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Start {
-    /// The pose.
     pub camera: Pose,
     /// Distance to the answer [m].
     pub distance_m: f64,
@@ -59,12 +57,10 @@ pub struct Start {
     pub excluded: bool,
 }
 
-/// One picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrameAnswer {
     /// Its file, or clip and time.
     pub name: String,
-    /// Its loss.
     pub loss: f64,
     /// Where the robot's joint origins and the flange are in it: column and row [pixel], free of distortion.
     pub joints_px: Vec<[f64; 2]>,

@@ -30,7 +30,6 @@ type Plane = Vector3<f64>;
 
 /// The robot's share of every pixel, from depths [mm] of a picture without distortion; 0 everywhere where all that is seen
 /// lies in planes.
-#[must_use]
 pub fn silhouette(depth: &Grid, lens: &Lens) -> Grid {
     let sights: Vec<Vector3<f64>> = (0..depth.values.len()).map(|i| sight(i, depth.width, lens)).collect();
     let depths: Vec<f64> = depth.values.iter().map(|d| f64::from(*d) * 1e-3).collect();

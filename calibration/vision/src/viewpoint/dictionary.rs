@@ -35,7 +35,6 @@ const KNOWN: [Known; 22] = [
 
 impl Dictionary {
     /// The dictionary that OpenCV calls so, with `DICT_` before it or without: `DICT_5X5_100`, `DICT_APRILTAG_36h11`.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         let name = name.strip_prefix("DICT_").unwrap_or(name);
         let (_, side, markers, codes) = KNOWN.iter().find(|(known, ..)| known.eq_ignore_ascii_case(name))?;
@@ -44,13 +43,11 @@ impl Dictionary {
     }
 
     /// How many markers there are.
-    #[must_use]
     pub fn markers(&self) -> usize {
         self.codes.len()
     }
 
     /// Whether the field in a column and a row of a marker is light; `None` beyond the dictionary or the marker.
-    #[must_use]
     pub fn is_light(&self, marker: usize, column: u32, row: u32) -> Option<bool> {
         let code = self.codes.get(marker).filter(|_| column < self.side && row < self.side)?;
         let after = self.side * self.side - 1 - (row * self.side + column);

@@ -7,7 +7,6 @@ use super::grid::Grid;
 const FAR: f32 = 1e9;
 
 /// Distance of every pixel centre to the nearest one that is `marked` [pixel]; `f32::INFINITY` where none is.
-#[must_use]
 pub(super) fn distance(width: usize, height: usize, mut marked: impl FnMut(usize) -> bool) -> Grid {
     let mut squared: Vec<f32> = (0..width * height).map(|i| if marked(i) { 0.0 } else { FAR }).collect();
     let mut line = Envelope::new(width.max(height));
@@ -30,7 +29,6 @@ pub(super) fn distance(width: usize, height: usize, mut marked: impl FnMut(usize
 
 /// Distance to the border between inside and outside [pixel], negative inside; the border runs half-way between pixel
 /// centres. The picture's own edge is no border.
-#[must_use]
 pub(super) fn signed_distance(width: usize, height: usize, inside: &[bool]) -> Grid {
     let mut out = distance(width, height, |i| inside[i]);
     let within = distance(width, height, |i| !inside[i]);

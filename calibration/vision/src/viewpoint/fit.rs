@@ -26,7 +26,6 @@ pub enum Method {
 /// A pose and how it was found.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The pose.
     pub camera_from_base: Isometry3<f64>,
     /// Share of wrong pixels (masks), or distance of the outline to edges, 0 to 1 (photos); mean of the frames.
     pub loss: f64,
@@ -40,7 +39,6 @@ pub struct Fit {
     pub drawings: usize,
 }
 
-/// No pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NoFit {
     /// Too little of the robot is where the camera looks.

@@ -22,7 +22,6 @@ pub enum Evidence {
 
 impl Evidence {
     /// The same with every grid changed.
-    #[must_use]
     pub fn map(self, change: impl Fn(Grid) -> Grid) -> Self {
         match self {
             Self::Mask(grid) => Self::Mask(change(grid)),
@@ -69,7 +68,6 @@ impl Frame {
     pub const FINEST: usize = WIDTHS.len() - 1;
 
     /// From a picture freed of its lens's distortion.
-    #[must_use]
     pub fn new(name: String, q: Joints, lens: Lens, evidence: &Evidence, shape: &Shape) -> Self {
         let level = |(number, widest): (usize, &usize)| {
             let shrunk = |grid: &Grid| grid.shrunk(grid.width.div_ceil(*widest));
@@ -96,44 +94,37 @@ impl Frame {
     }
 
     /// Draws the robot at this level.
-    #[must_use]
     pub fn outliner(&self, level: usize) -> Outliner {
         let level = &self.levels[level];
         Outliner::new(level.size[0], level.size[1], level.lens)
     }
 
     /// The parts in the camera's frame.
-    #[must_use]
     pub fn placed(&self, camera_from_base: &Isometry3<f64>) -> Vec<Isometry3<f64>> {
         self.placed.iter().map(|base_from_part| camera_from_base * base_from_part).collect()
     }
 
     /// How this level projects.
-    #[must_use]
     pub fn lens(&self, level: usize) -> &Lens {
         &self.levels[level].lens
     }
 
     /// Columns and rows of this level.
-    #[must_use]
     pub fn size(&self, level: usize) -> [usize; 2] {
         self.levels[level].size
     }
 
     /// Pixels of the original picture in one of this level, along a row.
-    #[must_use]
     pub fn factor(&self, level: usize) -> usize {
         self.levels[level].factor
     }
 
     /// Whether the robot is told apart by a mask, not by edges of a photo.
-    #[must_use]
     pub fn has_mask(&self) -> bool {
         matches!(self.levels[0].kind, Kind::Silhouette(_))
     }
 
     /// What a search from afar brings down: about 1 where robot and picture have nothing in common.
-    #[must_use]
     pub fn apart(&self, shape: &Shape, camera_from_base: &Isometry3<f64>) -> f64 {
         let mut outliner = self.outliner(Self::COARSEST);
         let placed = self.placed(camera_from_base);
@@ -151,7 +142,6 @@ impl Frame {
     }
 
     /// The same from an outline alone, which may leave the picture.
-    #[must_use]
     pub fn outline_apart(&self, outline: impl Iterator<Item = Place>) -> f64 {
         match &self.levels[Self::COARSEST].kind {
             Kind::Silhouette(silhouette) => silhouette.outline_apart(outline),
@@ -160,7 +150,6 @@ impl Frame {
     }
 
     /// The paper's loss: share of wrong pixels of two masks, at this level; for a photo the outline's distance to edges.
-    #[must_use]
     pub fn wrong(&self, level: usize, shape: &Shape, camera_from_base: &Isometry3<f64>) -> f64 {
         if ending::asked() {
             return 1.0;
@@ -176,7 +165,6 @@ impl Frame {
     }
 
     /// What the picture says about a place of the outline at this level, looking no further than `range` pixels.
-    #[must_use]
     pub fn pull(&self, level: usize, place: &Place, range: f64) -> Option<Pull> {
         match &self.levels[level].kind {
             Kind::Silhouette(silhouette) => silhouette.pull(place),
@@ -185,7 +173,6 @@ impl Frame {
     }
 
     /// The drawn robot smoothed, for [`Self::pull_exact`]; `None` for a photo.
-    #[must_use]
     pub fn smoothed(&self, level: usize, outliner: &Outliner) -> Option<Grid> {
         match &self.levels[level].kind {
             Kind::Silhouette(silhouette) => Some(silhouette.smoothed(outliner.covered())),
@@ -195,7 +182,6 @@ impl Frame {
 
     /// What the picture says about a place that lies nearly on the border, finer than pixels: a silhouette compared with the
     /// drawn robot, a photo by all that is seen across the edge.
-    #[must_use]
     pub fn pull_exact(&self, level: usize, place: &Place, drawn: Option<&Grid>) -> Option<Pull> {
         match &self.levels[level].kind {
             Kind::Silhouette(silhouette) => silhouette.pull_smooth(place, drawn?),

@@ -3,10 +3,8 @@
 use super::lens::Lens;
 use shared_mem::lens::Distortion;
 
-/// The picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
-    /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
@@ -22,13 +20,11 @@ impl Grid {
     }
 
     /// The number of a pixel.
-    #[must_use]
     pub fn at(&self, x: usize, y: usize) -> f32 {
         self.values[y * self.width + x]
     }
 
     /// Between pixel centres, linear in both directions; `None` outside of them.
-    #[must_use]
     pub fn sample(&self, u: f64, v: f64) -> Option<f64> {
         let inside = u >= 0.0 && v >= 0.0 && u <= (self.width - 1) as f64 && v <= (self.height - 1) as f64;
         inside.then(|| {
@@ -41,7 +37,6 @@ impl Grid {
     }
 
     /// Means of squares of `factor` pixels; a rest at the right and lower border is left out.
-    #[must_use]
     pub fn shrunk(&self, factor: usize) -> Self {
         if factor == 1 {
             return self.clone();
@@ -57,7 +52,6 @@ impl Grid {
     }
 
     /// Weighted means of 3 x 3 pixels with the weights 1, 2, 1, `times` over: a bell of sigma `sqrt(times / 2)` pixels.
-    #[must_use]
     pub fn blurred(mut self, times: usize) -> Self {
         let (width, height) = (self.width, self.height);
         for _ in 0..times {
@@ -77,7 +71,6 @@ impl Grid {
 
     /// What a lens without distortion and otherwise the same numbers would have shown; `outside` where the picture has
     /// nothing to show.
-    #[must_use]
     pub fn undistorted(self, lens: &Lens, distortion: &Distortion, outside: f32) -> Self {
         if !distortion.is_bent() {
             return self;
@@ -89,7 +82,6 @@ impl Grid {
     }
 
     /// The same of numbers between which there is nothing: every pixel shows the one that lies nearest, 0 outside.
-    #[must_use]
     pub fn undistorted_nearest(self, lens: &Lens, distortion: &Distortion) -> Self {
         if !distortion.is_bent() {
             return self;

@@ -32,7 +32,6 @@ pub struct Interval {
 }
 
 /// The interval of a pose; `None` when there are fewer than three witnesses or they leave a direction open.
-#[must_use]
 pub fn interval(refined: &Refined, frames: usize) -> Option<Interval> {
     let groups: Vec<Group> = refined.freed().collect();
     let links = witnesses(&groups, |group| (0, group.link));

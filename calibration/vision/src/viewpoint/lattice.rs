@@ -42,7 +42,6 @@ const WAYS: [[i32; 2]; 4] = [[1, 0], [-1, 0], [0, 1], [0, -1]];
 
 /// The lattices that the corners form, the one around the strongest corner first. Each lies as the chessboard does: its
 /// second axis is a quarter turn from its first, from columns towards rows. Two may share crossings; the board there tells.
-#[must_use]
 pub fn lattices(corners: &[Corner]) -> Vec<Vec<Crossing>> {
     let mut order: Vec<usize> = (0..corners.len()).collect();
     order.sort_by(|a, b| corners[*b].response.total_cmp(&corners[*a].response));

@@ -16,26 +16,22 @@ pub struct Lens {
 
 impl Lens {
     /// From cell.toml's numbers.
-    #[must_use]
     pub fn new(intrinsics: &Intrinsics) -> Self {
         Self { focal: [intrinsics.fx, intrinsics.fy], centre: [intrinsics.cx, intrinsics.cy] }
     }
 
     /// For the picture in which every pixel is the mean of `factor * factor` ones.
-    #[must_use]
     pub fn shrunk(&self, factor: usize) -> Self {
         let factor = factor as f64;
         Self { focal: self.focal.map(|f| f / factor), centre: self.centre.map(|c| (c - (factor - 1.0) / 2.0) / factor) }
     }
 
     /// Column and row of a point of the optical frame; the point lies before the camera.
-    #[must_use]
     pub fn project(&self, p: &Point3<f64>) -> [f64; 2] {
         [self.focal[0] * p.x / p.z + self.centre[0], self.focal[1] * p.y / p.z + self.centre[1]]
     }
 
     /// Where a lens that bends shows what the pinhole alone would put at `pixel`.
-    #[must_use]
     pub fn bent(&self, distortion: &Distortion, pixel: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.plane(pixel);
         let seen = distortion.bend(x, y).0;
@@ -43,7 +39,6 @@ impl Lens {
     }
 
     /// The way back; `None` where the lens shows nothing at `pixel`.
-    #[must_use]
     pub fn straight(&self, distortion: &Distortion, pixel: [f64; 2]) -> Option<[f64; 2]> {
         let plane = distortion.straight(self.plane(pixel))?;
         Some([0, 1].map(|i| self.focal[i] * plane[i] + self.centre[i]))
@@ -55,7 +50,6 @@ impl Lens {
     }
 
     /// For the rasteriser.
-    #[must_use]
     pub fn pinhole(&self) -> Pinhole {
         let [fx, fy, cx, cy] = [self.focal[0], self.focal[1], self.centre[0], self.centre[1]].map(|value| value as f32);
         Pinhole { fx, fy, cx, cy }

@@ -13,7 +13,6 @@ use std::path::Path;
 pub struct Moment {
     /// Joint positions [rad].
     pub q: Vec<f64>,
-    /// The camera.
     pub camera: Option<Calibration>,
 }
 

@@ -47,7 +47,6 @@ const PIECE: f64 = 3.0;
 
 impl Outliner {
     /// For pictures of this size.
-    #[must_use]
     pub fn new(width: usize, height: usize, lens: Lens) -> Self {
         let raster = Raster::new(width, height, lens.pinhole(), -Vector3::z());
         Self { width, height, lens, raster, corners: Vec::new(), facing: Vec::new() }
@@ -62,7 +61,6 @@ impl Outliner {
     }
 
     /// `1/z` of what was drawn, row by row [1/m]; 0 where nothing is.
-    #[must_use]
     pub fn inverse_depth(&self) -> &[f32] {
         self.raster.inverse_depth()
     }

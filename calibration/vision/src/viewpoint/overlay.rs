@@ -13,7 +13,6 @@ const WIDEST: usize = 960;
 const MOST: usize = 6;
 
 /// Columns, rows and pixels (red, green, blue) of a sheet with the first pictures below each other.
-#[must_use]
 pub fn sheet(
     frames: &[Frame],
     pixels: &[Pixels],

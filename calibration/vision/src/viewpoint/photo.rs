@@ -39,7 +39,6 @@ const STEEPEST: f64 = 3.0;
 
 impl Photo {
     /// From red, green and blue, 0 to 255. `searched`: distances for a search from afar are wanted too.
-    #[must_use]
     pub fn new(channels: [Grid; 3], searched: bool) -> Self {
         let channels = channels.map(|grid| grid.blurred(BLUR));
         let slopes = Slopes::of(&channels);
@@ -56,7 +55,6 @@ impl Photo {
 
     /// How badly an outline fits to the edges: 0 where it lies on edges of its direction, 1 where it is far from them.
     /// `whole`: what the outline's length is about when all of it is in the picture [m]; what is missing lies outside.
-    #[must_use]
     pub fn apart(&self, outline: impl Iterator<Item = Place>, focal: f64, whole: f64) -> f64 {
         let reach = REACH * self.channels[0].width as f64;
         let (mut sum, mut total) = (0.0, 0.0);
@@ -74,7 +72,6 @@ impl Photo {
 
     /// The edge that explains the picture across a place that lies nearly on it: not where contrast is largest, which light
     /// shifts.
-    #[must_use]
     pub fn pull_exact(&self, place: &Place) -> Option<Pull> {
         let along = |step: i32| [0, 1].map(|i| place.pixel[i] + f64::from(step) * place.outward[i]);
         let mut profile = [Samples::zeros(); 3];
@@ -96,7 +93,6 @@ impl Photo {
     }
 
     /// The clearest edge on the normal of a place, not further than `range` [pixel].
-    #[must_use]
     pub fn pull(&self, place: &Place, range: f64) -> Option<Pull> {
         let steps = range.ceil() as i32;
         let at = |step: i32| {

@@ -73,13 +73,11 @@ impl Pixels {
     }
 
     /// Whether it shows depths, not colours.
-    #[must_use]
     pub fn is_depth(&self) -> bool {
         self.channels.len() == 1
     }
 
     /// Free of the lens's distortion; what lies outside of the picture is black.
-    #[must_use]
     pub fn undistorted(self, lens: &Lens, distortion: &Distortion) -> Self {
         if !distortion.is_bent() {
             return self;
@@ -93,7 +91,6 @@ impl Pixels {
     }
 
     /// The mean of the colours, 0 to 255.
-    #[must_use]
     pub fn grey(&self) -> Grid {
         let share = 1.0 / self.channels.len().max(1) as f32;
         let [width, height] = self.size;

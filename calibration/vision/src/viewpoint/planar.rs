@@ -19,7 +19,6 @@ pub struct Seen {
 const STEPS: usize = 30;
 
 /// The plane's frame, whose points have `z = 0`, in the camera's; `None` for fewer than four points, or points on a line.
-#[must_use]
 pub fn pose(seen: &[Seen], lens: &Lens) -> Option<Isometry3<f64>> {
     let first = from_homography(seen, lens)?;
     let normal = first.rotation * Vector3::z();
@@ -62,7 +61,6 @@ fn from_homography(seen: &[Seen], lens: &Lens) -> Option<Isometry3<f64>> {
 
 /// How one plane shows in another, from points of both: the direct linear transform, both sides about the origin and of
 /// unit size (Hartley 1997). `None` for fewer than four points, or points on a line.
-#[must_use]
 pub fn homography(pairs: &[([f64; 2], [f64; 2])]) -> Option<Matrix3<f64>> {
     if pairs.len() < 4 {
         return None;

@@ -67,7 +67,6 @@ struct Shape {
 }
 
 impl Profiles {
-    /// Made once.
     pub(super) fn all() -> &'static Self {
         static ALL: LazyLock<Profiles> = LazyLock::new(Profiles::new);
         &ALL

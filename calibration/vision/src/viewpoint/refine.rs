@@ -15,7 +15,6 @@ use std::ops::Range;
 /// A pose and what the pictures say there.
 #[derive(Debug, Clone)]
 pub struct Refined {
-    /// The pose.
     pub camera_from_base: Isometry3<f64>,
     /// Mean robust cost of a pixel of outline, 0 to 1.
     pub cost: f64,
@@ -83,7 +82,6 @@ const STILL: f64 = 2e-3;
 const INNER: f64 = 0.3;
 
 /// The best pose near `start`, by the stages in `which`: [`COARSE`], [`FINE`] or [`LAST`].
-#[must_use]
 pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Range<usize>) -> Option<Refined> {
     let mut best: Option<Refined> = None;
     let mut drawings = 0;
@@ -130,14 +128,12 @@ pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Ra
 }
 
 /// The equations at a pose, as the last stage sees them.
-#[must_use]
 pub fn at(frames: &[Frame], shape: &Shape, camera_from_base: &Isometry3<f64>) -> Option<Refined> {
     Work::new(frames, shape, &STAGES[STAGES.len() - 1]).at(camera_from_base)
 }
 
 impl Refined {
     /// The equations of all groups.
-    #[must_use]
     pub fn sums(&self) -> (Matrix6<f64>, Vector6<f64>) {
         let sum = (Matrix6::zeros(), Vector6::zeros());
         self.freed().fold(sum, |(h, g), group| (h + group.information, g + group.gradient))

@@ -13,7 +13,6 @@ use shared_mem::ending;
 /// A pose that is worth a closer look.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
-    /// The pose.
     pub camera_from_base: Isometry3<f64>,
     /// How badly it fits, about 0 to 1.
     pub loss: f64,
@@ -42,7 +41,6 @@ pub(super) fn places(start: &Isometry3<f64>, reach: &Reach) -> Vec<Vector3<f64>>
 
 /// The best poses around `start`, the best first and each of its own; and how many times the robot was drawn. `looked` is told
 /// of every one of the [`places`] once it was looked from.
-#[must_use]
 pub(super) fn scan(
     frames: &[Frame],
     shape: &Shape,

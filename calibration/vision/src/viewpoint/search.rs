@@ -19,11 +19,8 @@ pub struct Reach {
 /// A pose that was searched for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Searched {
-    /// The pose.
     pub camera_from_base: Isometry3<f64>,
-    /// Its loss.
     pub loss: f64,
-    /// Losses computed.
     pub evaluations: usize,
 }
 
@@ -37,7 +34,6 @@ pub struct Moves {
 
 impl Moves {
     /// All poses that `start` may be mistaken for.
-    #[must_use]
     pub fn new(frames: &[Frame], start: &Isometry3<f64>, reach: &Reach) -> Self {
         let parts: Vec<Isometry3<f64>> = frames.iter().flat_map(|frame| frame.placed(start)).collect();
         let sum = parts.iter().fold(Vector3::zeros(), |sum, part| sum + part.translation.vector);
@@ -57,13 +53,11 @@ impl Moves {
     }
 
     /// The pose that the numbers stand for.
-    #[must_use]
     pub fn pose(&self, numbers: &[f64]) -> Isometry3<f64> {
         moved(&self.start, &self.pivot, &Vector6::from_column_slice(numbers))
     }
 
     /// The paper's way: a particle swarm on the share of wrong pixels. `done` hears how many of the losses are computed.
-    #[must_use]
     pub fn swarm(
         &self,
         frames: &[Frame],

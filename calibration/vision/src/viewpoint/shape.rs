@@ -21,7 +21,6 @@ pub struct Shape {
     pub coarse: Vec<Part>,
 }
 
-/// One part.
 #[derive(Debug)]
 pub struct Part {
     /// Its triangles, for the rasteriser.
@@ -30,7 +29,6 @@ pub struct Part {
     pub corners: Vec<Point3<f64>>,
     /// Outward normals of the triangles, not normalised, and one corner of each.
     pub planes: Vec<(Vector3<f64>, u32)>,
-    /// Edges.
     pub edges: Vec<Edge>,
     /// The link it moves with.
     pub link: usize,
@@ -39,7 +37,6 @@ pub struct Part {
 /// An edge of a mesh.
 #[derive(Debug, Clone, Copy)]
 pub struct Edge {
-    /// Corners.
     pub ends: [u32; 2],
     /// The triangle on one side, and its third corner.
     pub one: (u32, u32),
@@ -49,7 +46,6 @@ pub struct Edge {
 
 impl Shape {
     /// From the robot's surface.
-    #[must_use]
     pub fn new(surface: RobotSurface) -> Self {
         let links = surface.links();
         let parts = |grid: f32| -> Vec<Part> {
@@ -60,15 +56,12 @@ impl Shape {
     }
 
     /// Every part's frame in the base at joint positions `q` [rad], in the order of the parts.
-    #[must_use]
     pub fn place(&self, q: &Joints) -> Vec<Isometry3<f64>> {
         let mut out = vec![Isometry3::identity(); self.fine.len()];
         self.surface.for_each(q, |part, frame| out[part] = frame);
         out
     }
 
-    /// The robot.
-    #[must_use]
     pub fn surface(&self) -> &RobotSurface {
         &self.surface
     }

@@ -28,7 +28,6 @@ const STEEP: f64 = 0.4;
 
 impl Silhouette {
     /// From the share of every pixel that the robot covers.
-    #[must_use]
     pub fn new(share: Grid) -> Self {
         let inside: Vec<bool> = share.values.iter().map(|v| *v >= 0.5).collect();
         let distance = signed_distance(share.width, share.height, &inside);
@@ -44,7 +43,6 @@ impl Silhouette {
 
     /// How far the drawn robot and the silhouette are from each other: 0 where they agree, about 1 where they have
     /// nothing in common; falls towards the right place from far away.
-    #[must_use]
     pub fn apart(&self, covered: &[bool]) -> f64 {
         let reach = REACH * self.share.width as f32;
         let drawn = super::distance::distance(self.share.width, self.share.height, |i| covered[i]);
@@ -62,7 +60,6 @@ impl Silhouette {
     }
 
     /// The same from an outline alone: its mean distance to the silhouette's border.
-    #[must_use]
     pub fn outline_apart(&self, outline: impl Iterator<Item = Place>) -> f64 {
         let reach = f64::from(REACH) * self.share.width as f64 / 2.0;
         let (mut sum, mut total) = (0.0, 0.0);
@@ -75,7 +72,6 @@ impl Silhouette {
     }
 
     /// What was drawn, smoothed as the silhouette is.
-    #[must_use]
     pub fn smoothed(&self, covered: impl Iterator<Item = bool>) -> Grid {
         let values = covered.map(|covered| f32::from(u8::from(covered))).collect();
         Grid { width: self.share.width, height: self.share.height, values }.blurred(SMOOTH)
@@ -83,7 +79,6 @@ impl Silhouette {
 
     /// Where the border is against the drawn one, of which the place is part. Both are made of pixels in the same way, so
     /// that what pixels do to a border cancels; good to a few hundredths of a pixel, and blind beyond two.
-    #[must_use]
     pub fn pull_smooth(&self, place: &Place, drawn: &Grid) -> Option<Pull> {
         let [u, v] = place.pixel;
         let [x, y] = place.outward;
@@ -96,7 +91,6 @@ impl Silhouette {
     }
 
     /// Where the border is, seen from a place of the outline.
-    #[must_use]
     pub fn pull(&self, place: &Place) -> Option<Pull> {
         if !place.is_outer {
             return None;

@@ -21,10 +21,8 @@ pub(super) enum IndexError {
     /// It is missing, or no file.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// The disk.
     #[error("{0}")]
     Io(#[from] io::Error),
-    /// Another file.
     #[error("it is no recording by librealsense (a ROS bag, version 2.0)")]
     NoBag,
     /// The recorder was killed, or the copy is not whole.

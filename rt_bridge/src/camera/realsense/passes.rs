@@ -21,7 +21,6 @@ pub(super) struct Passes {
 }
 
 impl Passes {
-    /// None yet.
     pub(super) fn new(out: Destination) -> Self {
         Self { out, files: Vec::new() }
     }

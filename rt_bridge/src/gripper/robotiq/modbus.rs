@@ -17,21 +17,18 @@ pub const MOST: usize = 123;
 pub enum Request {
     /// Registers from `address` on.
     Read {
-        /// First register.
         address: u16,
         /// How many, 1 to [`MOST`].
         count: u16,
     },
     /// These values into the registers from `address` on.
     Write {
-        /// First register.
         address: u16,
         /// Their values, 1 to [`MOST`] of them.
         values: Vec<u16>,
     },
 }
 
-/// An answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Reply {
     /// What the registers hold.
@@ -60,7 +57,6 @@ pub enum Garbage {
 }
 
 /// CRC-16 of Modbus: polynomial 0x8005 reflected, start 0xFFFF.
-#[must_use]
 pub fn crc(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0xFFFF, |crc, byte| {
         (0..8).fold(crc ^ u16::from(*byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0xA001 } else { crc >> 1 })
@@ -75,7 +71,6 @@ fn sealed(mut frame: Vec<u8>) -> Vec<u8> {
 
 impl Request {
     /// The request's bytes for a station.
-    #[must_use]
     pub fn encode(&self, station: u8) -> Vec<u8> {
         match self {
             Self::Read { address, count } => {

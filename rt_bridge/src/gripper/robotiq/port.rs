@@ -51,7 +51,6 @@ impl Robotiq {
     }
 
     /// On a port that is open; `device` is its name for people, `patience` how long an answer may take.
-    #[must_use]
     pub fn on(port: Box<dyn SerialPort>, device: String, gripper: &Gripper, patience: Duration) -> Self {
         Self { device, port, orders: Orders::new(gripper), fault: 0, patience }
     }

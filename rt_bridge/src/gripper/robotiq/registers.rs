@@ -45,7 +45,6 @@ pub enum Activation {
 /// What the fingers do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fingers {
-    /// They move.
     Moving,
     /// They were stopped by something while they opened.
     StoppedOpening,
@@ -58,7 +57,6 @@ pub enum Fingers {
 /// What the gripper reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Status {
-    /// Activation.
     pub activation: Activation,
     /// Whether it goes to the position asked for.
     pub going: bool,
@@ -74,7 +72,6 @@ pub struct Status {
 
 impl Action {
     /// The three registers to write.
-    #[must_use]
     pub fn registers(&self) -> [u16; 3] {
         let bit = |set: bool, bit: u16| if set { bit } else { 0 };
         let action = bit(self.active, ACTIVE) | bit(self.go, GO);
@@ -84,7 +81,6 @@ impl Action {
 
 impl Status {
     /// From the three registers read.
-    #[must_use]
     pub fn from_registers(registers: [u16; 3]) -> Self {
         let [status, fault, position] = registers.map(|register| register.to_be_bytes());
         Self {
@@ -107,14 +103,12 @@ impl Status {
     }
 
     /// Whether something is between the fingers.
-    #[must_use]
     pub fn holds(&self) -> bool {
         self.going && matches!(self.fingers, Fingers::StoppedClosing | Fingers::StoppedOpening)
     }
 }
 
 /// What a fault code means and what to do about it; `None` for codes that pass by themselves and for none.
-#[must_use]
 pub fn fault_in_words(code: u8) -> Option<&'static str> {
     // The upper half is the controller's own code, which says nothing a user could act on.
     Some(match code & 0x0F {

@@ -106,7 +106,6 @@ enum Mode {
     },
 }
 
-/// The robot.
 pub(super) struct Robot {
     body: Body,
     rules: JointRules,

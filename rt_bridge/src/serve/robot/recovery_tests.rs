@@ -6,7 +6,6 @@ use crate::serve::wire::{Load, Request};
 
 const SET_IMPEDANCE: u32 = 4;
 const SET_LOAD: u32 = 9;
-/// Invalid argument.
 const INVALID: u8 = 2;
 
 fn load(mass: f64, at: f64) -> Request {

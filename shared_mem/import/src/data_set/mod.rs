@@ -78,7 +78,6 @@ pub enum DataSetError {
     /// An episode is not as the plan says.
     #[error("`{feature}`: {what}; export episodes of one task")]
     Shape {
-        /// Of what.
         feature: String,
         /// What is wrong.
         what: String,
@@ -112,7 +111,6 @@ const TIMESTAMP: &str = "timestamp";
 
 impl DataSetWriter {
     /// Begins a data set in a new folder.
-    #[must_use]
     pub fn new(folder: OutputFolder, plan: DataSetPlan) -> Self {
         let of = |feature: &Feature| match &feature.kind {
             FeatureKind::Numbers(names) => Statistics::of_numbers(names.len()),

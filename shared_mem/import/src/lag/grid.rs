@@ -82,7 +82,6 @@ impl Grid {
 }
 
 /// The usual time between rows [s]; 0 of fewer than two.
-#[must_use]
 pub fn usual_step(t: &[f64]) -> f64 {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);

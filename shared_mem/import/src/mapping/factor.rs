@@ -20,7 +20,6 @@ impl Default for Factor {
 
 impl Factor {
     /// That of a joint; 1 beyond a list's end.
-    #[must_use]
     pub fn of(&self, joint: usize) -> f64 {
         match self {
             Self::All(factor) => *factor,

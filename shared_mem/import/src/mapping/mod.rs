@@ -19,7 +19,6 @@ use std::path::Path;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Pieces {
-    /// One clip.
     #[default]
     Whole,
     /// A clip of each motion, cut where the commands rest, or the joints where there are no commands.
@@ -116,7 +115,6 @@ block! {
         /// Columns of the velocities; empty: none.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         pub dq: Vec<String>,
-        /// Their unit.
         #[serde(default)]
         pub dq_unit: RateUnit,
         /// What the velocities are multiplied with, beside their unit.
@@ -143,7 +141,6 @@ block! {
     pub struct PoseColumns {
         /// Columns of x, y, z.
         pub position: [String; 3],
-        /// Their unit.
         #[serde(default)]
         pub position_unit: LengthUnit,
         /// Columns of the quaternion's w, x, y, z.
@@ -162,7 +159,6 @@ impl Mapping {
 
     /// The same with what one block says for the other: a rate for both where they are of one table; and with names for joints
     /// that have none.
-    #[must_use]
     pub(crate) fn completed(mut self) -> Self {
         if let (Some(measured), Some(desired)) = (&self.measured, &mut self.desired)
             && measured.table == desired.table
@@ -184,7 +180,6 @@ impl Mapping {
     }
 
     /// The first line that is still to be filled in: its key.
-    #[must_use]
     pub fn open_line(&self) -> Option<&'static str> {
         let (measured, desired) = (self.measured.as_ref(), self.desired.as_ref());
         let lacks_unit = |c: &JointColumns| c.q_unit == AngleUnit::NotKnown;

@@ -98,7 +98,6 @@ pub enum TorquesAct {
 
 impl TimeUnit {
     /// One of it [s].
-    #[must_use]
     pub const fn seconds(self) -> f64 {
         match self {
             Self::Second => 1.0,
@@ -109,7 +108,6 @@ impl TimeUnit {
     }
 
     /// One of it [ns].
-    #[must_use]
     pub const fn nanoseconds(self) -> f64 {
         match self {
             Self::Second => 1e9,
@@ -127,7 +125,6 @@ impl AngleUnit {
     }
 
     /// One of it [rad], or [m].
-    #[must_use]
     pub const fn si(self) -> f64 {
         match self {
             Self::Radian | Self::Metre | Self::NotKnown => 1.0,
@@ -138,7 +135,6 @@ impl AngleUnit {
     }
 
     /// The unit of velocities that goes with it.
-    #[must_use]
     pub const fn per_second(self) -> RateUnit {
         match self {
             Self::Radian | Self::Turn | Self::NotKnown => RateUnit::RadianPerSecond,
@@ -151,7 +147,6 @@ impl AngleUnit {
 
 impl RateUnit {
     /// One of it [rad/s], or [m/s].
-    #[must_use]
     pub const fn si(self) -> f64 {
         match self {
             Self::RadianPerSecond | Self::MetrePerSecond => 1.0,
@@ -164,7 +159,6 @@ impl RateUnit {
 
 impl LengthUnit {
     /// One of it [m].
-    #[must_use]
     pub const fn metres(self) -> f64 {
         match self {
             Self::Metre => 1.0,

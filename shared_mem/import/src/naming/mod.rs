@@ -22,7 +22,6 @@ pub(crate) struct Group {
     pub(crate) base: String,
     /// What tells them apart, as a number or a joint's name; empty where there is one.
     pub(crate) labels: Vec<String>,
-    /// Their names.
     pub(crate) names: Vec<String>,
     /// Their places in the table.
     pub(crate) at: Vec<usize>,

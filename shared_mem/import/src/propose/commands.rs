@@ -19,7 +19,6 @@ const OR_NONE: &str =
 /// What was found of commands.
 #[derive(Debug)]
 pub(super) enum Found<'a> {
-    /// These.
     These(Box<Command<'a>>),
     /// Columns are commands by their name, and by their numbers none: it was asked.
     Open,

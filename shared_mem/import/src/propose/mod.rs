@@ -48,7 +48,6 @@ pub(crate) struct Proposal {
     pub(crate) notes: Vec<Note>,
 }
 
-/// Collects reasons.
 #[derive(Default)]
 struct Notes(Vec<Note>);
 

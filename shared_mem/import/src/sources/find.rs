@@ -98,7 +98,6 @@ pub(super) fn file(path: &Path) -> Result<Source, ImportError> {
 /// What a folder holds.
 #[derive(Debug, Default)]
 pub(super) struct Folder {
-    /// Logs.
     pub(super) sources: Vec<Source>,
     /// Files that are none.
     pub(super) others: Vec<PathBuf>,

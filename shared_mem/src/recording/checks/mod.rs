@@ -88,7 +88,6 @@ fn unlogged_block(
 }
 
 /// How many of so many rows may be left out: 1 %, and one of 20 and more.
-#[must_use]
 pub fn few_rows(rows: usize) -> usize {
     ((rows as f64 * LARGEST_BAD_SHARE) as usize).max(usize::from(rows >= ROWS_OF_ONE))
 }

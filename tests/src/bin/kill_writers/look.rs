@@ -13,13 +13,10 @@ pub(crate) const OLD: &[u8] = b"of before";
 /// What became of an output.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Found {
-    /// Not there.
     Absent,
-    /// As before.
     Old,
     /// New and whole.
     New,
-    /// Neither.
     Half(String),
 }
 

@@ -52,7 +52,6 @@ pub struct Grid {
 
 impl Grid {
     /// An empty one.
-    #[must_use]
     pub fn new(settings: Settings) -> Self {
         Self { settings, numbers: HashMap::new(), places: Vec::new(), blocks: Vec::new() }
     }

@@ -53,7 +53,6 @@ impl Default for Settings {
 }
 
 /// The surface that all views see.
-#[must_use]
 pub fn fuse<'a>(views: impl IntoIterator<Item = View<'a>>, settings: Settings) -> Surface {
     let mut grid = Grid::new(settings);
     views.into_iter().for_each(|view| grid.add(&view));

@@ -45,7 +45,6 @@ struct Cell {
 
 impl Grid {
     /// The surface that the views taken in show together.
-    #[must_use]
     pub fn surface(&self) -> Surface {
         surface(self)
     }

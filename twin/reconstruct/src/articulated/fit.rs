@@ -19,7 +19,6 @@ pub(super) struct Points<'a> {
     pub(super) second: &'a [Sample],
 }
 
-/// Both states.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair<'a> {
     pub(super) first: &'a Body,

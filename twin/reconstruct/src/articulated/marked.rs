@@ -26,7 +26,6 @@ const APART: f64 = 5e-3;
 pub struct MarkedView {
     /// What it is called.
     pub name: String,
-    /// Its camera.
     pub camera: Camera,
     /// The camera's pose in the mesh's frame [m].
     pub mesh_from_camera: Isometry3<f64>,

@@ -81,7 +81,6 @@ pub enum ArticulatedError {
     /// Nothing is left of a part.
     #[error("nothing is left of one of the two parts; move it further and scan again")]
     Nothing,
-    /// Ctrl-C.
     #[error("interrupted")]
     Interrupted,
 }
@@ -134,9 +133,7 @@ pub struct Articulated {
     pub position: f64,
     /// How sure it is; `None` where a person gave it.
     pub certainty: Option<Certainty>,
-    /// What stays.
     pub base: Part,
-    /// What moves.
     pub part: Part,
     /// The states, the first one with its base where the second one's is.
     pub states: Vec<State>,
@@ -273,7 +270,6 @@ impl Articulated {
     }
 
     /// Whether a place of the second state, on or beside its surface, belongs to the part that moves.
-    #[must_use]
     pub fn moves(&self, place: &Point3<f64>) -> bool {
         is_beyond(&self.border, place)
     }

@@ -8,7 +8,6 @@ const NO_TURN: f64 = 1e-6;
 /// A joint with one degree of freedom and how far it has moved, in the frame of the first state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Joint {
-    /// A hinge.
     Revolute {
         /// A point of its axis [m].
         point: Point3<f64>,
@@ -17,7 +16,6 @@ pub enum Joint {
         /// From the first state to the second [rad].
         angle: f64,
     },
-    /// A slide.
     Prismatic {
         /// From the first state to the second [m].
         travel: Vector3<f64>,
@@ -26,7 +24,6 @@ pub enum Joint {
 
 impl Joint {
     /// What the part does from the first state to the second.
-    #[must_use]
     pub fn motion(&self) -> Isometry3<f64> {
         match self {
             Self::Revolute { point, axis, angle } => {
@@ -40,7 +37,6 @@ impl Joint {
     }
 
     /// What the part does from position 0 to a position [rad or m].
-    #[must_use]
     pub fn by(&self, position: f64) -> Isometry3<f64> {
         match *self {
             Self::Revolute { point, axis, .. } => Self::Revolute { point, axis, angle: position }.motion(),
@@ -49,7 +45,6 @@ impl Joint {
     }
 
     /// How far it goes [rad or m].
-    #[must_use]
     pub fn travel(&self) -> f64 {
         match self {
             Self::Revolute { angle, .. } => *angle,
@@ -59,7 +54,6 @@ impl Joint {
 
     /// The hinge that comes nearest to a rigid motion: its axis is that of the screw, its pitch left out. A motion without rotation
     /// becomes a small one about an axis far away, across the translation. `near` is where the axis' point shall be near to.
-    #[must_use]
     pub fn hinge(motion: &Isometry3<f64>, near: &Point3<f64>) -> Self {
         let shift = motion * near - near;
         let (axis, angle) = match motion.rotation.axis_angle() {
@@ -75,13 +69,11 @@ impl Joint {
     }
 
     /// The slide that moves a place as a rigid motion does.
-    #[must_use]
     pub fn slide(motion: &Isometry3<f64>, near: &Point3<f64>) -> Self {
         Self::Prismatic { travel: motion * near - near }
     }
 
     /// The joint as another frame sees it.
-    #[must_use]
     pub fn seen_from(&self, frame: &Isometry3<f64>) -> Self {
         match self {
             Self::Revolute { point, axis, angle } => {
@@ -92,7 +84,6 @@ impl Joint {
     }
 
     /// The way back.
-    #[must_use]
     pub fn reversed(&self) -> Self {
         match *self {
             Self::Revolute { point, axis, angle } => Self::Revolute { point, axis: -axis, angle },
@@ -100,8 +91,6 @@ impl Joint {
         }
     }
 
-    /// Its direction.
-    #[must_use]
     pub fn direction(&self) -> Unit<Vector3<f64>> {
         match self {
             Self::Revolute { axis, .. } => *axis,
@@ -110,7 +99,6 @@ impl Joint {
     }
 
     /// With the axis' point where the axis comes nearest to a place.
-    #[must_use]
     pub fn near(self, place: &Point3<f64>) -> Self {
         match self {
             Self::Revolute { point, axis, angle } => {

@@ -11,7 +11,6 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 /// All files with their paths in the output folder; frames and splats are in one frame, of which `origin` becomes the new origin.
-#[must_use]
 pub fn dataset_files(frames: &[Frame], splats: &SplatCloud, origin: &Point3<f64>) -> Vec<(PathBuf, Vec<u8>)> {
     let splats = super::centred_splats(splats, origin);
     let mut cameras = String::from("# number, model, width, height, parameters\n");

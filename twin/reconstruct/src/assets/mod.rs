@@ -56,19 +56,16 @@ pub struct Labels {
 }
 
 /// Splats in the object's frame.
-#[must_use]
 pub fn centred_splats(splats: &SplatCloud, middle: &Point3<f64>) -> SplatCloud {
     splats.moved(&Similarity3::new(-middle.coords, Vector3::zeros(), 1.0))
 }
 
 /// A mesh in the object's frame.
-#[must_use]
 pub fn centred(mesh: &Mesh, middle: &Point3<f64>) -> Mesh {
     Mesh { points: mesh.points.iter().map(|p| p - middle.coords).collect(), triangles: mesh.triangles.clone() }
 }
 
 /// All files with their paths in the output folder; `pieces` are convex and in the object's frame.
-#[must_use]
 pub fn files(object: &Object, pieces: &[Mesh], labels: &Labels) -> Vec<(PathBuf, Vec<u8>)> {
     let middle = object.middle();
     let (fine, coarse) = (centred(&object.fine, &middle), centred(&object.coarse, &middle));

@@ -20,7 +20,6 @@ pub struct Summary {
     pub volume_m3: f64,
     /// Volume of the convex pieces together [m³].
     pub pieces_volume_m3: f64,
-    /// Convex pieces.
     pub pieces: usize,
     /// Mass [kg].
     pub mass_kg: f64,
@@ -34,7 +33,6 @@ pub struct Summary {
     pub surface: Topology,
     /// Triangles of the coarse mesh.
     pub coarse_triangles: usize,
-    /// Splats.
     pub splats: usize,
     /// Metres for one unit of the scan's poses, and who says so.
     pub scale: Scale,
@@ -44,7 +42,6 @@ pub struct Summary {
     pub with_depth: bool,
     /// How far the cameras' poses were moved, root mean square [m].
     pub cameras_moved_m: f64,
-    /// Held-out views.
     pub held_out: Vec<HeldOutNumbers>,
     /// Their mean PSNR inside the mask [dB].
     pub psnr_db: f64,
@@ -59,7 +56,6 @@ pub struct Summary {
 /// The numbers of one held-out view.
 #[derive(Debug, Clone, Serialize)]
 pub struct HeldOutNumbers {
-    /// The picture.
     pub view: String,
     /// PSNR inside the mask with the camera fitted to the object [dB].
     pub psnr_db: f64,
@@ -73,7 +69,6 @@ pub struct HeldOutNumbers {
 
 impl Summary {
     /// The numbers of an object with its convex pieces.
-    #[must_use]
     pub fn of(object: &Object, pieces: &[Mesh], labels: &Labels) -> Self {
         let (low, high) = object.fine.bounds();
         let middle = object.middle();

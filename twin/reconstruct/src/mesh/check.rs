@@ -21,9 +21,7 @@ pub enum Flaw {
 /// The kind of a closed surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Topology {
-    /// Corners.
     pub corners: usize,
-    /// Triangles.
     pub triangles: usize,
     /// Handles, of all parts together.
     pub genus: i64,

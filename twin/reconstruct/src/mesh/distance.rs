@@ -12,7 +12,6 @@ const BESIDE: [f64; 2] = [1.234_567e-5, 2.718_281e-5];
 
 /// A box around the mesh with about `nodes` nodes and a rim of `margin`, with signed distances: negative inside, in voxels. The field
 /// has no colours.
-#[must_use]
 pub fn distances(mesh: &Mesh, nodes: f64, margin: usize) -> Field<f32> {
     let (low, high) = mesh.bounds();
     let grid = Grid::filling(&low, &high, nodes, margin);

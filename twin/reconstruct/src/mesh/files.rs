@@ -4,7 +4,6 @@ use super::Mesh;
 use std::fmt::Write as _;
 
 /// A Wavefront OBJ [m].
-#[must_use]
 pub fn obj(mesh: &Mesh) -> String {
     let mut text = String::with_capacity(40 * (mesh.points.len() + mesh.triangles.len()));
     for point in &mesh.points {
@@ -18,7 +17,6 @@ pub fn obj(mesh: &Mesh) -> String {
 }
 
 /// A binary PLY [m] with colours, and, where it is known, with how many pictures show each corner (at most 255).
-#[must_use]
 pub fn ply(mesh: &Mesh, colours: &[[u8; 3]], pictures: Option<&[u8]>) -> Vec<u8> {
     let shown = if pictures.is_some() { "property uchar pictures\n" } else { "" };
     let head = format!(

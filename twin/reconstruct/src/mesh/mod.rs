@@ -36,20 +36,17 @@ pub struct Mesh {
 
 impl Mesh {
     /// Places of a triangle's corners.
-    #[must_use]
     pub fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
         self.triangles[triangle].map(|corner| self.points[corner as usize])
     }
 
     /// A triangle's area [m²].
-    #[must_use]
     pub fn area(&self, triangle: usize) -> f64 {
         let [a, b, c] = self.corners(triangle);
         0.5 * (b - a).cross(&(c - a)).norm()
     }
 
     /// The smallest box along the axes that holds the mesh: low and high corner [m].
-    #[must_use]
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         let low = self.points.iter().fold(Vector3::repeat(f64::INFINITY), |m, p| m.inf(&p.coords));
         let high = self.points.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |m, p| m.sup(&p.coords));

@@ -94,7 +94,6 @@ struct Work {
 
 /// A mesh with at most so many triangles, or as near to that as it stays a surface: closed where it was closed. Ends early, with more
 /// triangles, once the end was asked for.
-#[must_use]
 pub fn reduced(mesh: &Mesh, triangles: usize) -> Mesh {
     let mut work = Work::new(mesh);
     let mut left = mesh.triangles.len();

@@ -16,7 +16,6 @@ pub struct Solid {
 
 impl Solid {
     /// From the tetrahedra between the middle of the mesh's box and each triangle.
-    #[must_use]
     pub fn of(mesh: &Mesh) -> Self {
         let (low, high) = mesh.bounds();
         // Near to the mesh: far from it, differences of large numbers would be left.

@@ -15,7 +15,6 @@ const APART: f32 = 0.02;
 /// What was left out beside the object.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Islands {
-    /// Other bodies.
     pub bodies: usize,
     /// Their volume, of the object's.
     pub share: f64,
@@ -24,7 +23,6 @@ pub struct Islands {
 }
 
 /// The surface where the field is zero, and what was left out; `None` where nothing is inside.
-#[must_use]
 pub fn surface(field: &Field<f32>) -> Option<(Mesh, Islands)> {
     let all = marched(field);
     let parts = parts(&all);

@@ -56,7 +56,6 @@ pub(crate) struct Adam {
 pub(crate) struct Rates {
     /// Of distances [voxel].
     pub(crate) distance: f32,
-    /// Of colours.
     pub(crate) colour: f32,
 }
 

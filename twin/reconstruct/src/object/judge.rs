@@ -33,7 +33,6 @@ pub struct HeldOut {
     pub drawn: Drawn,
     /// And of the splats, over black.
     pub splats: Vec<[u8; 3]>,
-    /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,

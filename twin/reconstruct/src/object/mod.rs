@@ -315,20 +315,17 @@ impl Bounds {
 
 impl Object {
     /// Middle of the fine mesh's box: where the object's own frame has its origin, in the scan's frame [m].
-    #[must_use]
     pub fn middle(&self) -> Point3<f64> {
         let (low, high) = self.fine.bounds();
         nalgebra::center(&low, &high)
     }
 
     /// Mean PSNR of the held-out views inside the mask [dB].
-    #[must_use]
     pub fn psnr(&self) -> f64 {
         self.held_out.iter().map(|view| view.psnr).sum::<f64>() / self.held_out.len().max(1) as f64
     }
 
     /// The same of the splats [dB].
-    #[must_use]
     pub fn psnr_splats(&self) -> f64 {
         self.held_out.iter().map(|view| view.psnr_splats).sum::<f64>() / self.held_out.len().max(1) as f64
     }

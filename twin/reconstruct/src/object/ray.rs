@@ -76,7 +76,6 @@ pub(crate) struct Medium<'a, T> {
     pub(crate) pace: T,
 }
 
-/// Receives derivatives.
 pub(crate) trait Receiver<T> {
     /// Of the distances and colours at a node.
     fn distance(&mut self, node: usize, value: T);
@@ -84,7 +83,6 @@ pub(crate) trait Receiver<T> {
     fn colour(&mut self, node: usize, value: [T; 3]);
 }
 
-/// One sample.
 #[derive(Debug, Clone, Copy)]
 struct Sample<T> {
     t: T,
@@ -98,7 +96,6 @@ struct Sample<T> {
     live: bool,
 }
 
-/// One section.
 #[derive(Debug, Clone, Copy)]
 struct Section<T> {
     /// Its first sample.

@@ -34,7 +34,6 @@ pub enum StateError {
     /// It cannot be removed.
     #[error("cannot remove {}: {source}; remove it by hand", path.display())]
     Remove {
-        /// The file.
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,

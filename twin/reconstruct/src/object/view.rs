@@ -25,7 +25,6 @@ pub struct Drawn {
 }
 
 /// Draws the field from a pose in the scan's frame.
-#[must_use]
 pub fn draw(field: &Field<f32>, camera: &Camera, scan_from_camera: &Isometry3<f64>) -> Drawn {
     let grid = &field.grid;
     let band = Band::new(grid, &field.distance, reach(STEEPNESS));

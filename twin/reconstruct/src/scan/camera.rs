@@ -4,10 +4,8 @@
 use nalgebra::Point3;
 use shared_mem::lens::Distortion;
 
-/// One camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
-    /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
@@ -15,13 +13,11 @@ pub struct Camera {
     pub focal: [f64; 2],
     /// Principal point [pixel].
     pub centre: [f64; 2],
-    /// Its distortion.
     pub lens: Distortion,
 }
 
 impl Camera {
     /// Where a point of the camera's frame appears [pixel]; `None` behind the camera.
-    #[must_use]
     pub fn project(&self, point: &Point3<f64>) -> Option<[f64; 2]> {
         if point.z <= 1e-9 {
             return None;
@@ -31,7 +27,6 @@ impl Camera {
     }
 
     /// Direction of the ray through a place of the picture, as x/z and y/z, distortion taken back.
-    #[must_use]
     pub fn direction(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         self.lens.direction([(u - self.centre[0]) / self.focal[0], (v - self.centre[1]) / self.focal[1]])
     }
@@ -94,7 +89,6 @@ impl Camera {
     }
 
     /// COLMAP's name of its model, and the parameters.
-    #[must_use]
     pub fn to_colmap(&self) -> (&'static str, Vec<f64>) {
         let (model, coefficients): (_, &[f64]) = match &self.lens {
             Distortion::Polynomial([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]) => ("PINHOLE", &[]),

@@ -20,7 +20,6 @@ pub(crate) struct Image {
     pub(crate) seen: Vec<([f64; 2], u64)>,
 }
 
-/// A model.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Model {
     pub(crate) images: Vec<Image>,

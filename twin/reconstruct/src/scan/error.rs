@@ -16,7 +16,6 @@ pub enum ScanError {
     /// A file says something that cannot be.
     #[error("{}: {what}", path.display())]
     Content {
-        /// The file.
         path: PathBuf,
         /// What is wrong, and what to do.
         what: String,
@@ -31,7 +30,6 @@ pub enum ScanError {
 
 impl ScanError {
     /// A file that says something that cannot be.
-    #[must_use]
     pub fn content(path: &Path, what: impl Into<String>) -> Self {
         Self::Content { path: path.to_owned(), what: what.into() }
     }

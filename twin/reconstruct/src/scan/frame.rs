@@ -98,14 +98,12 @@ impl Frame {
     }
 
     /// Pixels that show the object.
-    #[must_use]
     pub fn masked(&self) -> usize {
         self.mask.iter().filter(|inside| **inside).count()
     }
 
     /// How far a pixel is from the mask's border [pixel]: positive inside, negative outside, cut at `most`. Distances count steps to
     /// the eight neighbours.
-    #[must_use]
     pub fn border_distance(&self, most: i16) -> Vec<i16> {
         let (width, height) = (self.camera.width as usize, self.camera.height as usize);
         let steps = |of: bool| {

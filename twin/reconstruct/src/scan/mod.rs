@@ -62,7 +62,6 @@ pub struct View {
 /// Pictures with poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
-    /// The folder.
     pub folder: PathBuf,
     /// Its views, in the order of their names.
     pub views: Vec<View>,
@@ -176,7 +175,6 @@ impl Scan {
     }
 
     /// Whether any view has depth.
-    #[must_use]
     pub fn has_depth(&self) -> bool {
         self.views.iter().any(|view| view.depth.is_some())
     }
@@ -198,13 +196,11 @@ impl Scan {
     }
 
     /// Whether a robot held the camera: its poses are then metres in its base frame, whose z points up.
-    #[must_use]
     pub fn is_of_robot(&self) -> bool {
         self.of_robot
     }
 
     /// The same scan with poses in metres.
-    #[must_use]
     pub fn scaled(mut self, metres: f64) -> Self {
         for view in &mut self.views {
             view.scan_from_camera.translation.vector *= metres;

@@ -15,11 +15,9 @@ const GREY: [u8; 3] = [200, 200, 200];
 pub struct HeldOut {
     /// The picture's path as the scan lists it.
     pub name: String,
-    /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// The picture.
     pub picture: Vec<[u8; 3]>,
     /// The same view of the splats.
     pub splats: Vec<[u8; 3]>,

@@ -74,7 +74,6 @@ pub enum SceneError {
     /// The splats cannot be trained.
     #[error(transparent)]
     Splats(#[from] TrainError),
-    /// Ctrl-C.
     #[error("interrupted; the same command goes on from {0:.0} % of the training of splats")]
     Interrupted(f64),
 }
@@ -99,7 +98,6 @@ pub struct Scene {
     pub surface: Surface,
     /// The same, coarser, in at most [`COLLISION`] triangles, as far as its holes leave that.
     pub collision: Mesh,
-    /// Splats.
     pub splats: SplatCloud,
     /// Planes that face up, the largest first.
     pub levels: Vec<Level>,
@@ -239,19 +237,16 @@ fn trained(
 
 impl Scene {
     /// The table's plane and the middle of its points.
-    #[must_use]
     pub fn table(&self) -> Option<&Level> {
         self.table.map(|number| &self.levels[number])
     }
 
     /// Mean PSNR of the held-out views by splats [dB].
-    #[must_use]
     pub fn psnr(&self) -> f64 {
         self.held_out.iter().map(|view| view.psnr).sum::<f64>() / self.held_out.len().max(1) as f64
     }
 
     /// Mean of the held-out views' middle difference between the surface's depth and the measured one [m].
-    #[must_use]
     pub fn depth_off(&self) -> f64 {
         self.held_out.iter().map(|view| view.depth_off).sum::<f64>() / self.held_out.len().max(1) as f64
     }

@@ -51,7 +51,6 @@ pub struct Frame<T: Real, const C: usize> {
 
 impl<T: Real, const C: usize> Frame<T, C> {
     /// Draws splats, for `C` of [`COLOR_DEPTH`] or [`COLOR_PLANE`] channels, as `size` columns and rows.
-    #[must_use]
     pub fn new(splats: &Parameters<T>, camera_from_body: &Isometry3<f64>, lens: &Lens, size: [usize; 2]) -> Self {
         let view = View::new(camera_from_body, lens, size);
         let drawn = tiles::drawn(splats, &view);
@@ -61,14 +60,12 @@ impl<T: Real, const C: usize> Frame<T, C> {
     }
 
     /// The picture.
-    #[must_use]
     pub fn planes(&self) -> Planes<T, C> {
         Planes::gather(&self.tiles, self.view.size)
     }
 
     /// The slope of a loss over the splats' parameters, from its slope over the picture: `slope.channels` over the
     /// channels, `slope.left` over the light that is left.
-    #[must_use]
     pub fn backward(&self, splats: &Parameters<T>, slope: &Planes<T, C>) -> Parameters<T> {
         let sums: Vec<Vec<Sums<T, C>>> = (self.tiles.par_iter().enumerate())
             .map(|(tile, pixels)| pixels.backward(&self.drawn, self.lists.of(tile), tile, slope))

@@ -29,7 +29,6 @@ const LEAST: f32 = 1e-6;
 
 impl<T: Real> Parameters<T> {
     /// All 0.
-    #[must_use]
     pub fn zeros(count: usize, degree: usize) -> Self {
         let none = T::zero();
         Self {
@@ -43,25 +42,21 @@ impl<T: Real> Parameters<T> {
     }
 
     /// How many splats.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.centre.len()
     }
 
     /// Whether there is none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.centre.is_empty()
     }
 
     /// How many coefficients each splat has.
-    #[must_use]
     pub fn coefficients(&self) -> usize {
         (self.degree + 1) * (self.degree + 1)
     }
 
     /// All numbers of each kind, splat by splat: centres, quaternions, sigmas, opacities, colours.
-    #[must_use]
     pub fn columns(&self) -> [&[T]; KINDS] {
         [
             self.centre.as_flattened(),
@@ -73,7 +68,6 @@ impl<T: Real> Parameters<T> {
     }
 
     /// The same to be changed.
-    #[must_use]
     pub fn columns_mut(&mut self) -> [&mut [T]; KINDS] {
         [
             self.centre.as_flattened_mut(),
@@ -85,7 +79,6 @@ impl<T: Real> Parameters<T> {
     }
 
     /// The columns of a cloud.
-    #[must_use]
     pub fn of(cloud: &SplatCloud) -> Self {
         let wide = |value: f32| T::of(f64::from(value));
         let mut out = Self::zeros(cloud.splats.len(), cloud.degree);
@@ -102,7 +95,6 @@ impl<T: Real> Parameters<T> {
     }
 
     /// The cloud of these columns.
-    #[must_use]
     pub fn cloud(&self) -> SplatCloud {
         let narrow = |value: T| value.wide() as f32;
         let splats = (0..self.len()).map(|i| {

@@ -24,7 +24,6 @@ pub struct Planes<T, const C: usize> {
 
 impl<T: Real, const C: usize> Planes<T, C> {
     /// All 0.
-    #[must_use]
     pub fn zeros(size: [usize; 2]) -> Self {
         let plane = || vec![T::zero(); size[0] * size[1]];
         Self { size, channels: std::array::from_fn(|_| plane()), left: plane() }
@@ -33,7 +32,6 @@ impl<T: Real, const C: usize> Planes<T, C> {
     /// Depth of each pixel [m], 0 where less than half of the light is kept back or a plane is seen from its edge. Of centres it is the
     /// mean; of planes it is where the pixel's ray meets the mean plane. `cover`: the light kept back, 1 - `left`; `rays`: the direction of
     /// each pixel with z = 1, only for planes.
-    #[must_use]
     pub fn depth(&self, cover: &[T], rays: &[Vector3<T>]) -> Vec<T> {
         let one = |at: usize| {
             let (sum, cover) = (self.channels[3][at], cover[at]);

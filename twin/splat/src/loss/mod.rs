@@ -42,7 +42,6 @@ pub struct Loss<T, const C: usize> {
 
 impl<T: Real, const C: usize> Loss<T, C> {
     /// Of a picture against a photograph. `cover`: the light kept back by which depths are divided, of this picture.
-    #[must_use]
     pub fn new(seen: &Planes<T, C>, cover: &[T], target: &Target<T>, weights: &Weights) -> Self {
         let mut loss = Self { value: T::zero(), slope: Planes::zeros(seen.size) };
         loss.color(seen, target, weights);

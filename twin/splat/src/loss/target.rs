@@ -26,7 +26,6 @@ pub struct Target<T> {
 
 impl<T: Real> Target<T> {
     /// The direction of every pixel of a picture behind a lens.
-    #[must_use]
     pub fn rays(lens: &Lens, size: [usize; 2]) -> Vec<Vector3<T>> {
         let ray = |i: usize| lens.ray([(i % size[0]) as f64, (i / size[0]) as f64]).map(T::of);
         (0..size[0] * size[1]).map(ray).collect()

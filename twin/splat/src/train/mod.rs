@@ -86,7 +86,6 @@ impl Rates {
 
 impl Settings {
     /// For an object with masks, depths where there are any, and splats on its surface.
-    #[must_use]
     pub fn object(steps: usize) -> Self {
         Self {
             steps,
@@ -100,7 +99,6 @@ impl Settings {
     }
 
     /// For a scene with walls and tables: its splats are drawn into planes.
-    #[must_use]
     pub fn scene(steps: usize) -> Self {
         let weights = Weights { similarity: 0.2, mask: 0.0, depth: 0.2, normals: 0.015 };
         let rates = Rates { centre: ON_SURFACE, ..Rates::default() };

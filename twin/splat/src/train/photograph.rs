@@ -72,7 +72,6 @@ impl Photograph {
     }
 
     /// How well a cloud shows it.
-    #[must_use]
     pub fn quality(&self, cloud: &SplatCloud, background: [f32; 3]) -> Quality {
         let target = self.target(background, false);
         let Camera { lens, camera_from_world } = &self.camera;

@@ -13,7 +13,6 @@ const OPACITY: f32 = 0.7;
 impl SplatCloud {
     /// Discs on the vertices of a mesh: `points` [m], `triangles` counter-clockwise from outside, a colour for every vertex
     /// (red, green, blue, 0 to 1), harmonics of a degree from 0 to 3. Vertices of no triangle are left out.
-    #[must_use]
     pub fn on_mesh(points: &[Point3<f32>], triangles: &[[u32; 3]], colors: &[[f32; 3]], degree: usize) -> Self {
         let mut normals = vec![Vector3::zeros(); points.len()];
         let mut edges = vec![(0.0f32, 0u32); points.len()];

@@ -22,7 +22,6 @@ pub struct UrdfBody {
 /// A joint that moves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UrdfJoint {
-    /// Its name.
     pub name: String,
     /// Place of the body that it hangs on, an earlier one.
     pub parent: usize,
@@ -42,7 +41,6 @@ pub struct UrdfJoint {
 
 impl UrdfJoint {
     /// The body's frame in that of the body that it hangs on, at a position [rad or m].
-    #[must_use]
     pub fn pose_at(&self, position: f64) -> Isometry3<f64> {
         let moved = match self.slides {
             true => Isometry3::from_parts((self.axis.into_inner() * position).into(), nalgebra::one()),
@@ -64,13 +62,9 @@ pub struct UrdfShape {
 /// A shape [m].
 #[derive(Debug, Clone, PartialEq)]
 pub enum UrdfForm {
-    /// Edge lengths.
     Box([f64; 3]),
-    /// Along z.
     Cylinder {
-        /// Its radius.
         radius: f64,
-        /// Its length.
         length: f64,
     },
     /// A file, as it is named.

@@ -19,7 +19,6 @@ pub struct UrdfFrames {
 pub struct LinkFrame<'a> {
     /// The link before.
     pub parent: &'a str,
-    /// The link.
     pub child: &'a str,
     /// Its frame in that of the link before [m].
     pub parent_from_child: Isometry3<f64>,
@@ -73,7 +72,6 @@ impl UrdfFrames {
     }
 
     /// With other names for these joints, one for each.
-    #[must_use]
     pub fn renamed(mut self, described: &[String], names: &[String]) -> Self {
         for joint in &mut self.joints {
             let place = described.iter().position(|described| *described == joint.name);
@@ -85,7 +83,6 @@ impl UrdfFrames {
     }
 
     /// Name of the link that hangs on nothing.
-    #[must_use]
     pub fn root(&self) -> &str {
         &self.root
     }

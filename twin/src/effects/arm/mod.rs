@@ -113,13 +113,11 @@ effects_on_the_arm! {
 
 impl ArmEffects {
     /// Whether there is none.
-    #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
     /// The arm that moves, made from the one that the controller knows.
-    #[must_use]
     pub fn real_arm(&self, nominal: &ArmModel) -> ArmModel {
         let mut arm = nominal.clone();
         self.change(&mut arm);
@@ -132,7 +130,6 @@ impl ArmEffects {
     /// The true state behind a reading, and a memory in which the arm has been there with this command for long.
     ///
     /// A gear that yields carries the arm's weight from the start.
-    #[must_use]
     pub fn start(&self, arm: &ArmModel, reading: &JointState, q_d: &Joints, dq_d: &Joints) -> (JointState, ArmMemory) {
         let mut memory = ArmMemory::new(self, q_d, dq_d);
         let state = self.restart(&mut memory, arm, reading, q_d, dq_d);
@@ -140,7 +137,6 @@ impl ArmEffects {
     }
 
     /// [`ArmEffects::start`] in a memory that was made by these effects, without allocating.
-    #[must_use]
     pub fn restart(
         &self,
         memory: &mut ArmMemory,
@@ -167,7 +163,6 @@ impl ArmEffects {
     }
 
     /// The command as it reaches the controller, one tick after the other.
-    #[must_use]
     pub fn command(&self, memory: &mut ArmMemory, q_d: &Joints, dq_d: &Joints) -> (Joints, Joints) {
         let (mut q_d, mut dq_d) = (*q_d, *dq_d);
         if self.command_delay.is_some() {
@@ -180,7 +175,6 @@ impl ArmEffects {
     }
 
     /// Ticks after which nothing is left of a command; 0 where commands arrive at once.
-    #[must_use]
     pub fn command_ticks(&self) -> u64 {
         let delay = self.command_delay.map_or(0.0, |effect| effect.delay);
         let lag = self.command_lag.map_or(0.0, |effect| effect.settling_time());
@@ -188,7 +182,6 @@ impl ArmEffects {
     }
 
     /// What the encoders tell about `state`; they sit on the motors.
-    #[must_use]
     pub fn measured(&self, memory: &ArmMemory, state: &JointState) -> JointState {
         let mut reading = if self.yields() { memory.motor } else { *state };
         if let Some(effect) = &self.joint_encoder_offset {
@@ -199,7 +192,6 @@ impl ArmEffects {
 
     /// What the controller asks for where it does more than its law, one tick after the other [N m]. `tau`: what the law asks for at
     /// `reading` under the command `q_d` that reaches it, gravity included.
-    #[must_use]
     pub fn asked(
         &self,
         memory: &mut ArmMemory,
@@ -216,7 +208,6 @@ impl ArmEffects {
 
     /// The motors' torque for the torque that the controller asks for, one tick after the other [N m]. `damped`: what of that the
     /// controller's damping takes at the joints' own velocities [N m].
-    #[must_use]
     pub fn motor_torque(&self, memory: &mut ArmMemory, tau: &Joints, damped: &Joints) -> Joints {
         let mut tau = *tau;
         if self.torque_delay.is_some() {
@@ -258,7 +249,6 @@ impl ArmEffects {
     }
 
     /// What friction, ripple and weight that the model lacks take of the motor's torque of a joint that moves so [N m].
-    #[must_use]
     pub fn taken(&self, joint: usize, state: &JointState, motor_torque: f64) -> f64 {
         let dq = state.dq[joint];
         let dry = if dq == 0.0 {
@@ -271,7 +261,6 @@ impl ArmEffects {
     }
 
     /// What the torque sensors behind the gears tell: mean over the last step [N m].
-    #[must_use]
     pub fn tau_J(&self, memory: &ArmMemory) -> Joints {
         match &self.torque_sensor_bias {
             None => memory.tau_J,

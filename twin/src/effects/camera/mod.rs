@@ -28,26 +28,22 @@ pub struct CameraMemory {
 
 impl CameraEffects {
     /// Whether there is none.
-    #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
     /// How much older a pose is than its stamp says [ns].
-    #[must_use]
     pub fn latency_ns(&self) -> u64 {
         self.camera_latency.map_or(0, |effect| effect.nanoseconds())
     }
 
     /// [`CameraEffects::report`] of a pose in the base frame; the pose itself, bit by bit, where there is no effect.
-    #[must_use]
     pub fn seen(&self, memory: &mut CameraMemory, stamp_ns: u64, pose: Pose<Base, Object>) -> Pose<Base, Object> {
         if self.is_none() { pose } else { Pose::from_isometry(self.report(memory, stamp_ns, &pose.isometry())) }
     }
 
     /// How far from where it is everything seems to be that a picture shows (base frame), because the camera stands
     /// elsewhere than its calibration says.
-    #[must_use]
     pub fn misplaced(&self) -> Isometry3<f64> {
         let mut moved = Isometry3::identity();
         if let Some(effect) = &self.camera_extrinsic_rotation {
@@ -60,14 +56,12 @@ impl CameraEffects {
     }
 
     /// The effects a picture cannot show, because they are the tracker's own, by name.
-    #[must_use]
     pub fn of_the_tracker(&self) -> Vec<&'static str> {
         let scale = self.camera_scale.map(|_| camera_scale::EFFECT.name);
         scale.into_iter().chain(self.tracker_smoothing.map(|_| tracker_smoothing::EFFECT.name)).collect()
     }
 
     /// Where an object was that is reported at `pose`, but for latency and smoothing.
-    #[must_use]
     pub fn undistorted(&self, pose: &Isometry3<f64>) -> Isometry3<f64> {
         let mut pose = *pose;
         if let Some(effect) = &self.camera_extrinsic_translation {
@@ -84,7 +78,6 @@ impl CameraEffects {
 
     /// What the tracker reports about an object that was at `pose` (base frame) one latency before the stamp `stamp_ns`.
     /// Stamps must ascend; a fresh `memory` begins without smoothing.
-    #[must_use]
     pub fn report(&self, memory: &mut CameraMemory, stamp_ns: u64, pose: &Isometry3<f64>) -> Isometry3<f64> {
         let mut pose = *pose;
         if let Some(effect) = &self.camera_scale {

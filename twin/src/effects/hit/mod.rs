@@ -24,7 +24,6 @@ pub struct HitEffects {
 
 impl HitEffects {
     /// The contact law of the real tip, made from the nominal one.
-    #[must_use]
     pub fn real_law(&self, nominal: ContactLaw) -> ContactLaw {
         let mut law = nominal;
         if let Some(effect) = &self.contact_compliance {
@@ -41,13 +40,11 @@ impl HitEffects {
     }
 
     /// From where the flange is said to hold the tool to where it does, in the flange frame [m]; `None` where they agree.
-    #[must_use]
     pub fn tool_shift(&self) -> Option<Translation3<f64>> {
         self.tool_offset.map(|effect| effect.shift())
     }
 
     /// Inertia about the object's z axis over that of the homogeneous body.
-    #[must_use]
     pub fn yaw_inertia_factor(&self) -> f64 {
         self.object_inertia.map_or(1.0, |effect| effect.factor)
     }

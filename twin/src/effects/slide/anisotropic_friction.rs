@@ -66,7 +66,6 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct AnisotropicFriction {
     size: f64,
-    /// Unit vector.
     axis: [f64; 2],
     drift: f64,
 }

@@ -63,7 +63,6 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct FrictionPatch {
     factor: f64,
-    /// Unit vector.
     direction: [f64; 2],
     distance: f64,
     radius: f64,

@@ -28,26 +28,22 @@ pub struct SlideEffects {
 
 impl SlideEffects {
     /// Gravity on the object, in the table's own axes [m/s^2]; `g` is its size.
-    #[must_use]
     pub fn gravity(&self, g: f64) -> Vector3<f64> {
         let level = Vector3::new(0.0, 0.0, -g);
         self.table_tilt.map_or(level, |effect| effect.gravity(level))
     }
 
     /// Force of a viscous film under the whole base over the base's velocity [N s/m]; 0 without one.
-    #[must_use]
     pub fn drag(&self) -> f64 {
         self.viscous_sliding_drag.map_or(0.0, |effect| effect.drag)
     }
 
     /// Reach of the pressure from the middle of the base, over the nominal one.
-    #[must_use]
     pub fn pressure_reach(&self) -> f64 {
         self.pressure_distribution.map_or(1.0, |effect| effect.reach)
     }
 
     /// Distance from the middle of the base of what a tipping object pivots about, over that of its corners.
-    #[must_use]
     pub fn pivot_reach(&self) -> f64 {
         self.pressure_distribution.map_or(1.0, |effect| effect.pivot)
     }

@@ -47,7 +47,6 @@ struct Buffers {
 /// The tiles' lists: as much room as any picture needed so far.
 #[derive(Debug)]
 struct Lists {
-    /// Entries.
     room: u64,
     group: wgpu::BindGroup,
 }

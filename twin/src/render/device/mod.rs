@@ -32,7 +32,6 @@ pub enum DeviceError {
     /// It cannot be opened.
     #[error("{name} cannot be opened: {what}; draw on the processor")]
     Closed {
-        /// The device.
         name: String,
         /// What it said.
         what: String,
@@ -43,7 +42,6 @@ pub enum DeviceError {
         megabytes(*needed), megabytes(*room)
     )]
     Room {
-        /// The device.
         name: String,
         /// What is too large.
         what: String,
@@ -55,7 +53,6 @@ pub enum DeviceError {
     /// The picture is larger than any that it draws.
     #[error("{name} draws pictures of up to {most} pixels along an edge, not {} x {}: draw smaller ones, or on the processor", size[0], size[1])]
     Picture {
-        /// The device.
         name: String,
         /// Columns and rows, with what a bent lens needs at the borders.
         size: [usize; 2],
@@ -65,14 +62,12 @@ pub enum DeviceError {
     /// It failed while it drew.
     #[error("{name} failed to draw: {what}; draw on the processor")]
     Failed {
-        /// The device.
         name: String,
         /// What it said.
         what: String,
     },
 }
 
-/// Rounded up.
 fn megabytes(bytes: u64) -> u64 {
     bytes.div_ceil(1_000_000)
 }
@@ -118,13 +113,11 @@ impl Device {
     }
 
     /// What it calls itself.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Whether the processor plays the device.
-    #[must_use]
     pub fn is_software(&self) -> bool {
         self.is_software
     }

@@ -9,7 +9,6 @@ use wgpu::{BindingType, ShaderStages, TextureFormat};
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 pub(super) const SURFACE: TextureFormat = TextureFormat::Rg32Uint;
 
-/// All programs.
 #[derive(Debug)]
 pub(super) struct Passes {
     pub(super) splat_layout: wgpu::BindGroupLayout,

@@ -12,7 +12,6 @@ const SPLAT: u64 = 64;
 /// Bytes of a corner: place, normal, colour.
 pub(super) const CORNER: u64 = 28;
 
-/// All models.
 #[derive(Debug)]
 pub(super) struct Upload {
     pub(super) splats: wgpu::Buffer,

@@ -33,7 +33,6 @@ pub(super) struct Member {
     pub(super) tip_friction: f64,
 }
 
-/// The world.
 #[derive(Clone)]
 pub(super) struct ManyBodies {
     world: World,

@@ -149,7 +149,6 @@ impl SimScene {
     }
 
     /// Arm and first object, and what is known of the arm.
-    #[must_use]
     pub fn cell(&self) -> &SimCell {
         &self.cell
     }
@@ -179,19 +178,16 @@ impl SimScene {
     }
 
     /// Names of all bodies in the order of cell.toml; empty for one object without a name.
-    #[must_use]
     pub fn names(&self) -> &[ObjectName] {
         &self.names
     }
 
     /// Place among the cell's objects of the one that a body belongs to.
-    #[must_use]
     pub fn object_of(&self, number: usize) -> usize {
         self.objects.get(number).copied().unwrap_or(0)
     }
 
     /// Whether a body hangs on another one by a joint.
-    #[must_use]
     pub fn is_on_joint(&self, number: usize) -> bool {
         self.many.as_ref().is_some_and(|many| many.is_on_joint(number))
     }
@@ -307,7 +303,6 @@ impl SimScene {
     }
 
     /// Geometric centre of a body by its number.
-    #[must_use]
     pub fn object(&self, number: usize) -> Option<Pose<Base, Object>> {
         match &self.many {
             Some(many) if self.is_together => many.pose(number),
@@ -316,7 +311,6 @@ impl SimScene {
     }
 
     /// Whether the tool presses on a body, or something else moves it.
-    #[must_use]
     pub fn is_moved(&self, number: usize) -> bool {
         match &self.many {
             Some(many) if self.is_together => many.is_moved(number),
@@ -326,7 +320,6 @@ impl SimScene {
     }
 
     /// Normal force between the tool and whatever it touches, mean over the last period [N].
-    #[must_use]
     pub fn contact_force(&self) -> f64 {
         let others = self.others.iter().filter(|_| !self.is_together);
         self.cell.contact_force() + others.map(|other| other.contact.record.mean_force).sum::<f64>()
@@ -352,7 +345,6 @@ impl SimScene {
     }
 
     /// The cell as a camera sees it now.
-    #[must_use]
     pub fn snapshot(&self) -> SceneSnapshot {
         let mut named = NamedPoses::default();
         for (number, name) in self.names.iter().enumerate() {

@@ -20,7 +20,6 @@ pub struct SceneState {
 
 impl SimScene {
     /// What the cell does now, to go on from later.
-    #[must_use]
     pub fn state(&self) -> SceneState {
         SceneState {
             cell: self.cell.state(),

@@ -67,7 +67,6 @@ pub enum ArmClipError {
     DeadJoint {
         /// Its number, from 1.
         joint: usize,
-        /// Its name.
         name: String,
     },
     /// It falls into pieces.

@@ -22,7 +22,6 @@ pub struct Moment {
 
 /// Moments of a clip at stamps [ns]; `None` where the law is no spring to the command with a damper to the ground, or the clip is too
 /// short to be smoothed. A damper that is told the desired velocity imitates no friction.
-#[must_use]
 pub fn moments(
     (model, law): (&ArmModel, ControllerKind),
     (measured, commands): (&JointSeries, &CommandTrack),

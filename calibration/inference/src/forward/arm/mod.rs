@@ -64,7 +64,6 @@ impl Channel {
     }
 }
 
-/// All channels.
 pub const CHANNELS: [Channel; 4] = [Channel::Position, Channel::Velocity, Channel::Torque, Channel::DesiredTorque];
 
 /// Least sigma of each channel: below it a real sensor is not that good, and the twin's own arithmetic is not either.
@@ -84,9 +83,7 @@ const FELT: f64 = 0.9;
 pub struct Row {
     /// Middle of the averaged stamps [ns].
     pub stamp_ns: u64,
-    /// The channel.
     pub channel: Channel,
-    /// The joint.
     pub joint: usize,
 }
 
@@ -113,7 +110,6 @@ pub struct ArmClips<F> {
 pub struct LeftOut {
     /// Name of its file.
     pub file: String,
-    /// The reason.
     pub why: ArmClipError,
 }
 
@@ -152,7 +148,6 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     }
 
     /// The same moved by another program, where there is one; `known`: the cell's nominal parameters.
-    #[must_use]
     pub fn moved_by(mut self, engine: Option<Arc<Engine>>, known: &Theta) -> Self {
         self.twin = engine.is_some().then(|| self.mover.clone());
         let wanted = self.channels.iter().map(|channel| channel.quantity()).collect();
@@ -182,7 +177,6 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 
     /// What is a clip's own: where the log is too coarse to tell the state in which it begins, that state (positions, then
     /// velocities, of all joints; otherwise their sigmas are 0), and how old its encoders' readings are.
-    #[must_use]
     pub fn random(&self) -> Vec<Random> {
         let coarse = self.clips.iter().any(|clip| {
             let rows = &clip.recorded.measured;

@@ -8,7 +8,6 @@ const MEDIAN_ABSOLUTE: f64 = 0.674_49;
 /// One sigma of the noise of an evenly sampled signal. Third differences take out the motion; their median takes out
 /// events. Never less than what its resolution leaves unknown: slow motion on a coarse encoder stands on one step for most
 /// of the time, and that is no certainty.
-#[must_use]
 pub fn sigma(signal: &[f64]) -> f64 {
     let mut thirds: Vec<f64> =
         signal.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).filter(|d| d.is_finite()).collect();
@@ -23,7 +22,6 @@ pub fn sigma(signal: &[f64]) -> f64 {
 
 /// One sigma of a sensor from that of its signal in each of several clips: what holds for most. A clip in which the reading
 /// never changes has 0 and tells nothing: the joint stood still, and what moves it less than a step is not seen.
-#[must_use]
 pub fn of_clips(sigmas: impl Iterator<Item = f64>) -> f64 {
     let mut told: Vec<f64> = sigmas.filter(|sigma| *sigma > 0.0).collect();
     told.sort_unstable_by(f64::total_cmp);

@@ -62,7 +62,6 @@ pub struct Late {
 
 impl Motion<'_> {
     /// The comparison; `None` for a joint that does not move enough to tell.
-    #[must_use]
     pub fn compared(&self, joint: usize) -> Option<Compared> {
         let Self { t, q, dq, noise } = *self;
         let rows = WINDOW_ROWS.max((WINDOW / step(t).max(1e-12)).round() as usize).min(t.len() / 4);
@@ -87,7 +86,6 @@ impl Motion<'_> {
 }
 
 /// Whether most joints' velocities come so late that they were filtered; `step`: of the log [s].
-#[must_use]
 pub fn late(joints: &[Compared], step: f64) -> Option<Late> {
     let delays: Vec<f64> = joints.iter().map(|c| c.delay.value).collect();
     let interval = delays.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], d| [lo.min(*d), hi.max(*d)]);
@@ -109,7 +107,6 @@ pub(super) fn contradict_positions(log: &JointSeries) -> bool {
 
 impl Compared {
     /// Whether the velocity is no slope of this joint's position.
-    #[must_use]
     pub fn is_not_its_slope(&self) -> bool {
         (self.factor.value - 1.0).abs() > NOT_ITS_SLOPE.max(5.0 * self.factor.sigma)
     }

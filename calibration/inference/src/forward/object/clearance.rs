@@ -34,7 +34,6 @@ pub struct Clearance {
 
 impl Clearance {
     /// `None` where the cell has no arm, no tool or no object, or the clip is of another robot.
-    #[must_use]
     pub fn new(cell: &Cell, clip: &Clip) -> Option<Self> {
         let arm = ArmModel::from_cell(cell).ok()?;
         let tool = cell.tool.as_ref()?;
@@ -67,7 +66,6 @@ impl Clearance {
 
 /// Until which stamp [ns] the arm of a clip surely moves alone; beyond the end where there is no object. Encoders and the object's
 /// first place tell it to the millisecond, unless the camera sees the object elsewhere; then it is seen to move.
-#[must_use]
 pub fn alone_until(cell: &Cell, clip: &Clip) -> u64 {
     if clip.kind == ClipKind::Excitation || clip.object.is_empty() {
         return u64::MAX;

@@ -34,7 +34,6 @@ pub(super) struct ObjectClip {
     pub(super) end_ns: u64,
     /// Measured rows of the arm that count.
     pub(super) arm_rows: Vec<usize>,
-    /// Their stamps.
     pub(super) arm_ns: Vec<u64>,
 }
 

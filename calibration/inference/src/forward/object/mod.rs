@@ -124,14 +124,12 @@ impl ObjectClips {
     }
 
     /// The same simulated by another program, where there is one; `nominal`: the cell's nominal parameters.
-    #[must_use]
     pub fn simulated_by(mut self, engine: Option<&Arc<Engine>>, nominal: &Theta) -> Self {
         self.simulator = engine.map(|engine| Simulator { engine: Arc::clone(engine), nominal: nominal.clone() });
         self
     }
 
     /// The other program.
-    #[must_use]
     pub fn engine(&self) -> Option<&Arc<Engine>> {
         self.simulator.as_ref().map(|simulator| &simulator.engine)
     }

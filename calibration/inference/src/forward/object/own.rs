@@ -36,7 +36,6 @@ pub enum Axis {
     X,
     /// To the left.
     Y,
-    /// Up.
     Z,
 }
 
@@ -66,7 +65,6 @@ const FRICTION_SCATTER: f64 = 0.03;
 
 impl Own {
     /// Name in reports.
-    #[must_use]
     pub fn name(self) -> String {
         let axis = |axis| match axis {
             Axis::X => "x",
@@ -88,7 +86,6 @@ impl Own {
     }
 
     /// Whether it means anything in a clip of this kind.
-    #[must_use]
     pub fn acts_in(self, kind: ClipKind) -> bool {
         match self {
             Self::LnFriction | Self::Start(_) | Self::StartYaw => true,
@@ -103,7 +100,6 @@ impl Own {
     ///
     /// The start is held where many rest frames put it: what is left of its error shows at the release, and there it has
     /// its place.
-    #[must_use]
     pub fn sigma(self, cell: &Cell, kind: ClipKind) -> f64 {
         let noise = super::noise_of(cell);
         let alone = kind == ClipKind::FreeMotion;
@@ -134,7 +130,6 @@ impl Own {
     }
 
     /// Name and difference step; held at zero.
-    #[must_use]
     pub fn random(self) -> Random {
         let step = match self {
             Self::Start(_) | Self::Release(_) => 1e-4,
@@ -152,7 +147,6 @@ pub struct Values([f64; ALL.len()]);
 
 impl Values {
     /// From the list that goes with [`ALL`]; what is missing is zero, and so is what means nothing in the clip.
-    #[must_use]
     pub fn new(own: &[f64], kind: ClipKind) -> Self {
         let mut values = Self::default();
         for ((value, own), number) in values.0.iter_mut().zip(own).zip(ALL) {
@@ -164,7 +158,6 @@ impl Values {
     }
 
     /// One of them.
-    #[must_use]
     pub fn of(&self, own: Own) -> f64 {
         ALL.iter().position(|other| *other == own).map_or(0.0, |i| self.0[i])
     }

@@ -33,7 +33,6 @@ pub struct Row {
     pub stamp_ns: u64,
     /// Part of the clip.
     pub part: Part,
-    /// Coordinate.
     pub channel: Channel,
 }
 

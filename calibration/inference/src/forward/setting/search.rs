@@ -16,7 +16,6 @@ const GAIN_STEP: f64 = 1e-4;
 
 /// Stiffness and damping of every joint, beginning at the base's, and where the masses of the links are not known what their weight
 /// asks of each joint; none where no law leads the arm.
-#[must_use]
 pub fn arm_numbers(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     let (Some(controller), Some(arm)) = (&cell.controller, &base.arm) else { return Vec::new() };
     if controller.kind == ControllerKind::Tracking {
@@ -75,7 +74,6 @@ const CENTRE_SHARE: f64 = 0.5;
 /// Friction, mass where it was not weighed, centre of mass and, where an arm may touch it, tip friction of the object, beginning at the
 /// base's. Difference steps are wide: where tool and object just part, a little more of any number moves the resting place, and
 /// over such a step that roughness averages out.
-#[must_use]
 pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     let (Some(object), Some(start)) = (cell.object(), &base.object) else { return Vec::new() };
     let mass = start.mass.unwrap_or_else(|| object.nominal_mass());
@@ -124,7 +122,6 @@ const ROUGH_STEP: f64 = 2e-2;
 const ORDER_STEP: f64 = 1e-5;
 
 /// Every number of an effect, for an arm of `dof` joints on such a robot, beginning where the effect changes nothing.
-#[must_use]
 pub fn effect_settings(info: &'static EffectInfo, robot: &Robot, dof: usize) -> Vec<(Setting, Unknown)> {
     let mut all = Vec::new();
     for parameter in info.parameters {

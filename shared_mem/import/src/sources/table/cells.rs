@@ -19,7 +19,6 @@ const MOST_LINES: usize = 10;
 pub(super) struct Cells {
     text: String,
     ends: Vec<usize>,
-    /// Columns.
     pub(super) width: usize,
     /// Names as they stand in the file; `None` where it has none.
     pub(super) names: Option<Vec<String>>,

@@ -26,7 +26,6 @@ use std::path::PathBuf;
 pub const LINKS: [&str; 2] = ["base", "part"];
 
 /// From the frame of the meshes to each link's frame.
-#[must_use]
 pub fn links_from_mesh(object: &Articulated) -> [Isometry3<f64>; 2] {
     let back = object.joint.by(-object.position);
     [Isometry3::identity(), Translation3::from(-origin(object, &back).coords) * back]
@@ -42,13 +41,11 @@ fn origin(object: &Articulated, back: &Isometry3<f64>) -> Point3<f64> {
 }
 
 /// A mesh in another frame.
-#[must_use]
 pub fn in_frame(mesh: &Mesh, frame: &Isometry3<f64>) -> Mesh {
     Mesh { points: mesh.points.iter().map(|p| frame * p).collect(), triangles: mesh.triangles.clone() }
 }
 
 /// All files with their paths in the output folder; `pieces` are convex and in the links' frames.
-#[must_use]
 pub fn articulated_files(object: &Articulated, pieces: &[Vec<Mesh>; 2], labels: &Labels) -> Vec<(PathBuf, Vec<u8>)> {
     let summary = ArticulatedSummary::of(object, labels);
     let frames = links_from_mesh(object);

@@ -14,9 +14,7 @@ const UNSURE: [f64; 2] = [0.0175, 3e-3];
 /// The numbers of an object with a part that moves.
 #[derive(Debug, Clone, Serialize)]
 pub struct ArticulatedSummary {
-    /// Its name.
     pub name: String,
-    /// The joint.
     pub joint: JointNumbers,
     /// Base and part.
     pub parts: [PartNumbers; 2],
@@ -59,7 +57,6 @@ pub struct JointNumbers {
 /// The numbers of a part, in its link's frame.
 #[derive(Debug, Clone, Serialize)]
 pub struct PartNumbers {
-    /// Its link.
     pub link: &'static str,
     /// Volume [m³].
     pub volume_m3: f64,
@@ -75,7 +72,6 @@ pub struct PartNumbers {
 
 impl ArticulatedSummary {
     /// The numbers of an object; a mass that was weighed is shared out by volume.
-    #[must_use]
     pub fn of(object: &Articulated, labels: &Labels) -> Self {
         let frames = links_from_mesh(object);
         let both = [&object.base, &object.part];

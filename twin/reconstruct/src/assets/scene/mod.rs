@@ -30,7 +30,6 @@ pub struct SceneSummary {
     pub surface: [usize; 2],
     /// Triangles of the mesh to collide with.
     pub collision_triangles: usize,
-    /// Splats.
     pub splats: usize,
     /// Whether they were drawn into planes.
     pub planar: bool,
@@ -40,7 +39,6 @@ pub struct SceneSummary {
     pub scale: Scale,
     /// Views that it was made from.
     pub views: usize,
-    /// Held-out views.
     pub held_out: Vec<ViewNumbers>,
     /// Their mean PSNR by splats, over whole pictures [dB].
     pub psnr_db: f64,
@@ -68,7 +66,6 @@ pub struct LevelNumbers {
 /// The numbers of one held-out view.
 #[derive(Debug, Clone, Serialize)]
 pub struct ViewNumbers {
-    /// The picture.
     pub view: String,
     /// PSNR of the splats over the whole picture [dB].
     pub psnr_db: f64,
@@ -80,7 +77,6 @@ pub struct ViewNumbers {
 
 impl SceneSummary {
     /// The numbers of a scene.
-    #[must_use]
     pub fn of(scene: &Scene) -> Self {
         let numbers = |level: &fusion::plane::Level| LevelNumbers {
             normal: level.plane.normal.into(),
@@ -127,7 +123,6 @@ impl SceneSummary {
 }
 
 /// All files with their paths in the output folder; `command` is the one that made it, for the report's foot.
-#[must_use]
 pub fn scene_files(scene: &Scene, command: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let summary = SceneSummary::of(scene);
     let surface = Mesh {
