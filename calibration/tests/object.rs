@@ -7,9 +7,10 @@ use calibration::identify::object::{Options, identify, identify_clips};
 use calibration::identify::{Identification, Optimizer};
 use inference::estimate::ClipModel as _;
 use inference::forward::Settings;
-use inference::forward::object::{ModelError, ObjectClips, Own};
+use inference::forward::object::{Channel, Nuisance, ObjectClips, Part, Row, diagnosed};
 use inference::forward::setting::{complete, object_parameters};
 use inference::interrupt::Interrupt;
+use shared_mem::cell::ClipKind;
 use std::path::{Path, PathBuf};
 
 fn world(number: u64) -> World {
@@ -60,23 +61,32 @@ fn what_is_kept_of_a_clip_gives_the_same_bits_as_simulating_it_anew() {
 }
 
 #[test]
-fn a_place_left_by_the_hit_moves_the_resting_place_by_as_much() {
-    let world = world(3);
-    let (mut clips, truth) = (strokes(&world, 1), truth(&world));
-    clips.set_model_error(ModelError::default());
-    let along_x = Own::Release(inference::forward::object::Axis::X);
-    let along_x = inference::forward::object::ALL.iter().position(|own| *own == along_x).expect("listed");
-    let ends = |own: &[f64]| {
-        let poses = clips.predict(0, &truth, own).expect("an answer").poses;
-        [poses.first(), poses.last()].map(|pose| pose.expect("a pose").position()[0])
+fn a_path_that_deviates_is_off_by_nothing_before_the_hit_and_by_all_of_it_where_the_object_rests() {
+    let own = diagnosed(ClipKind::ControlHitSlide);
+    let clips = strokes(&world(3), 1).with_nuisance(own.clone());
+    let (paths, noise) = (clips.path_slopes(0), clips.noise());
+    let rows: Vec<Row> = clips.rows(0).into_iter().filter(|row| !matches!(row.channel, Channel::Joint(_))).collect();
+    let of = |name: &str| {
+        let before = own.iter().take_while(|own| own.name() != name);
+        &paths[before.filter(|own| matches!(own, Nuisance::Path(_))).count()]
     };
-    let [start, plain] = ends(&[]);
-    // Away from the tool: into it, the tool would have the last word.
-    let shift = 0.002 * (plain - start).signum();
-    let mut own = vec![0.0; inference::forward::object::ALL.len()];
-    own[along_x] = shift;
-    let [_, moved] = ends(&own);
-    assert!((moved - plain - shift).abs() < 1e-3, "{plain} {moved}");
+    for (name, channel, sigma) in [
+        ("x when let go", Channel::Position(0), noise.position),
+        ("y when let go", Channel::Position(1), noise.position),
+        ("yaw when let go", Channel::Rotation(2), noise.rotation),
+        ("yaw of the slide", Channel::Rotation(2), noise.rotation),
+    ] {
+        assert_eq!(of(name).len(), rows.len());
+        for (row, slope) in rows.iter().zip(of(name)) {
+            let sigmas = match row.part {
+                _ if row.channel != channel => 0.0,
+                Part::Before => 0.0,
+                Part::After => -1.0,
+                Part::Hit | Part::Slide => (slope * sigma).clamp(-1.0, 0.0),
+            };
+            assert!((slope * sigma - sigmas).abs() < 1e-12, "{name}: {slope} at {row:?}");
+        }
+    }
 }
 
 /// Sessions of another engine and their truth.

@@ -9,12 +9,12 @@
 use super::score::Said;
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::evidence::measured::Evidence;
-use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::quadratic::minimum;
 use crate::diagnose::fit::shortlist;
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
+use inference::forward::random_effects::RandomEffects;
 use nalgebra::DMatrix;
 
 /// Names in the order of [`all`].
@@ -30,7 +30,7 @@ pub fn all<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: &Hypothes
     let point = Point { full, free, probed: &probed, clips: &clips, precision: Precision::Joints };
     let nothing = || said(&[]);
     let even = floor::sensors_alone(bench.evidence);
-    let swept = sweep(bench.evidence, bench.library, &point, &Scatter::default(), &|_| true);
+    let swept = sweep(bench.evidence, bench.library, &point, &RandomEffects::default(), &|_| true);
     let reduced = swept.and_then(|swept| Ok((swept.reduced(bench.evidence, &even)?, swept)));
     let Ok((reduced, swept)) = reduced else { return NAMES.map(|_| nothing()).to_vec() };
     let size = 1 + swept.columns.len();

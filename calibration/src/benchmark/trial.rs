@@ -40,7 +40,7 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let peaks = peaks(&world.cell, &admitted, &base)?;
     let library = Library::new(&world.cell, &base, admitted.ground().as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
-    let arm = ArmClips::new(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
+    let arm = ArmClips::moments(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
     let split = admitted.split(options.seed);
     let court = Court { world, library: &library, split, admitted: &admitted, interrupt };
     if admitted.with_object {

@@ -5,7 +5,7 @@ use crate::diagnose::clips::admit;
 use crate::identify::arm::ArmError;
 use crate::identify::object::{ObjectError, shows_object};
 use crate::identify::remarks::grouped;
-use inference::forward::arm::{ArmClips, Channel};
+use inference::forward::arm::ArmClips;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::recording::{Clip, PictureKind, ReadError, Session, for_pictures};
@@ -87,7 +87,7 @@ impl Rules {
             .filter(|clip| clip.kind != ClipKind::FreeMotion && !clip.measured.is_empty())
             .cloned()
             .collect();
-        let arm = ArmClips::new(cell, moving, &[Channel::Position], |_: &[f64]| Theta::default());
+        let arm = ArmClips::means(cell, moving, |_: &[f64]| Theta::default());
         let without_arm = arm.map(|(_, out)| out.into_iter().map(|out| (out.file, out.why.to_string())).collect());
         Self {
             arm: ArmModel::from_cell(cell).map_err(|error| error.to_string()),

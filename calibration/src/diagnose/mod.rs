@@ -229,13 +229,13 @@ fn diagnosed(
     let engine = options.engine.as_ref();
     let mut diagnosis = if admitted.with_object {
         let robot = session.cell.robot.as_ref();
-        let arm = robot.map(|_| ArmClips::new(&session.cell, &admitted.clips, theta)).transpose();
+        let arm = robot.map(|_| ArmClips::moments(&session.cell, &admitted.clips, theta)).transpose();
         let arm = arm.map_err(Refused::from)?.map(|arm| arm.moved_by(options.engine.clone(), &nominal));
         let object = ObjectClips::new(&session.cell, admitted.clips.clone(), library.settings.clone())?;
         let evidence = CellClips::new(arm, object.simulated_by(engine, &nominal), &library);
         examine(&evidence, &library, session, admitted, options, work)?
     } else {
-        let evidence = ArmClips::new(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
+        let evidence = ArmClips::moments(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
         let evidence = evidence.moved_by(options.engine.clone(), &nominal);
         examine(&evidence, &library, session, admitted, options, work)?
     };
@@ -259,7 +259,7 @@ pub fn peaks(cell: &Cell, admitted: &Admitted, base: &Theta) -> Result<Joints, D
     if cell.robot.is_none() {
         return Ok(Joints::default());
     }
-    let arm = ArmClips::new(cell, &admitted.clips, |_: &[f64]| base.clone()).map_err(Refused::from)?;
+    let arm = ArmClips::moments(cell, &admitted.clips, |_: &[f64]| base.clone()).map_err(Refused::from)?;
     arm.peaks(&[]).map_err(|_| DiagnoseError::NoBaseline)
 }
 

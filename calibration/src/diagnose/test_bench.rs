@@ -57,7 +57,7 @@ pub(super) fn on_bench<R>(
 ) -> R {
     let theta = |numbers: &[f64]| library.theta(numbers);
     let clips = record(world, 2).expect("a session");
-    let evidence = ArmClips::new(cell, &clips, &theta as Parameters<'_>).expect("an arm");
+    let evidence = ArmClips::moments(cell, &clips, &theta as Parameters<'_>).expect("an arm");
     let interrupt = Interrupt::default();
     ask(&bench(&evidence, library, &interrupt), &floor::sensors_alone(&evidence))
 }
@@ -71,7 +71,7 @@ pub(super) fn on_strokes<R>(
     let base = setting::complete(cell, None).expect("a cell");
     let library = Library::new(cell, &base, Ground::of(&clips).as_ref(), &[87.0; MAX_JOINTS]);
     let theta = |numbers: &[f64]| library.theta(numbers);
-    let arm = ArmClips::new(cell, &clips, &theta as Parameters<'_>).expect("an arm");
+    let arm = ArmClips::moments(cell, &clips, &theta as Parameters<'_>).expect("an arm");
     let object = ObjectClips::new(cell, clips, library.settings.clone()).expect("an object");
     let evidence = CellClips::new(Some(arm), object, &library);
     let interrupt = Interrupt::default();

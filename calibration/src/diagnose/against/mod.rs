@@ -127,7 +127,7 @@ fn compared(
     let peaks = peaks(cell, admitted, &base)?;
     let library = Library::new(cell, &base, admitted.ground().as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
-    let arm = cell.robot.as_ref().map(|_| ArmClips::new(cell, &admitted.clips, theta)).transpose();
+    let arm = cell.robot.as_ref().map(|_| ArmClips::moments(cell, &admitted.clips, theta)).transpose();
     let mut comparison = match arm.map_err(Refused::from)? {
         Some(arm) if !admitted.with_object => examine(&arm, &library, (sessions, pair), options, work)?,
         arm => {

@@ -305,7 +305,7 @@ fn weights<E: Evidence>(bench: &Bench<'_, E>, swept: &[Swept; 2]) -> Option<Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::evidence::scatter::Scatter;
+    use inference::forward::random_effects::RandomEffects;
 
     /// (1 - a - 2 b)^2 + (3 - b)^2 over (1, a, b).
     fn form() -> DMatrix<f64> {
@@ -324,7 +324,7 @@ mod tests {
         let clip = |slope: &f64| DMatrix::from_row_slice(2, 2, &[slope * slope, *slope, *slope, 1.0]);
         let clips = [slopes[..2].iter().map(clip).collect::<Vec<_>>(), slopes[2..].iter().map(clip).collect()];
         let forms = clips.each_ref().map(|clips: &Vec<DMatrix<f64>>| &clips[0] + &clips[1]);
-        let nothing = || Swept { columns: Vec::new(), scatter: Scatter::default(), clips: Vec::new() };
+        let nothing = || Swept { columns: Vec::new(), scatter: RandomEffects::default(), clips: Vec::new() };
         let slopes = Slopes { swept: [nothing(), nothing()], weights: Vec::new(), forms, clips };
         slopes.sigma((&[[Some(1), Some(1)]], &[0.0]), [None, Some(1)])
     }

@@ -5,9 +5,9 @@
 
 use super::super::library::Library;
 use crate::diagnose::evidence::measured::{Channel, Evidence, Measured, Near, Row};
-use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
 use inference::estimate::{ClipModel, Impossible, Unknown};
 use inference::forward::Setting;
+use inference::forward::random_effects::{RandomEffects, WithOwn};
 
 /// One of the two sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -182,7 +182,7 @@ impl<E: Evidence> Measured for TwoSessions<'_, E> {
         self.evidence.rows(clip)
     }
 
-    fn scatter(&self) -> Scatter {
+    fn scatter(&self) -> RandomEffects {
         self.evidence.scatter()
     }
 

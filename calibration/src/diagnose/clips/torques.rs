@@ -5,16 +5,12 @@
 //! ([`ControllerKind::Tracking`]), and this torque is held against the measured one. Effects on the way of a command do not show;
 //! friction, payloads, base tilts and the like do, gains and delays or not.
 
+pub(in crate::diagnose) use inference::forward::arm::is_tracking;
 use inference::forward::smoothing;
 use shared_mem::cell::{Cell, Controller, ControllerKind, Robot};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
-
-/// Whether the arm of a cell goes along what was measured, whatever its controller was.
-pub(in crate::diagnose) fn is_tracking(cell: &Cell) -> bool {
-    cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Tracking)
-}
 
 /// What was found, without the gains of the law that kept the arm on its way: no robot has those. `given`: what was known before.
 pub(in crate::diagnose) fn without_law(theta: Theta, given: Option<&Theta>) -> Theta {

@@ -4,20 +4,19 @@
 //! Every clip has a friction and a clock of its own, and its object deviates from the simulated path: nobody simulates an
 //! impact exactly, and the error grows along the path. That deviation is a random effect, added to the simulated poses, so it
 //! costs no simulation; its scale is what an effect must beat to be believed
-//! ([`super::scatter_scale`]).
+//! ([`inference::forward::random_effects_scale`]).
 
 use super::arm_clips::ArmClips;
 use super::contact::Contact;
-use super::deviations;
 use super::measured::{Channel, Group, Measured, Near, Reach, Row, StageName};
-use super::recent::Recent;
-use super::scatter::{Scatter, WithOwn};
 use crate::diagnose::library::Library;
 use inference::engine::Engine;
-use inference::estimate::{ClipModel, Impossible, Random};
+use inference::estimate::{ClipModel, Impossible};
 use inference::forward::Setting;
 use inference::forward::arm::following::Moment;
-use inference::forward::object::{self, ALL, ModelError, ObjectClips, Own, Part};
+use inference::forward::object::{self, ModelError, ObjectClips, Part, diagnosed};
+use inference::forward::random_effects::{RandomEffects, WithOwn};
+use inference::forward::recent::Recent;
 use shared_mem::cell::{ClipKind, PoseNoise};
 use shared_mem::theta::Theta;
 use std::sync::Arc;
@@ -42,23 +41,17 @@ const IN_THE_PLANE: [usize; 3] = [0, 1, 5];
 /// under a blow is not modelled well enough to learn from.
 const TIPPING: PoseNoise = PoseNoise { position: 3e-3, rotation: 0.05 };
 
-/// What a clip has of its own before the deviations of its path: friction first. An object alone keeps its own time.
-const OF_STROKES: &[Own] = &[Own::LnFriction, Own::Clock];
-const OF_OBJECTS_ALONE: &[Own] = &[Own::LnFriction];
-const FRICTION: usize = 0;
-
 /// The arm where there is one, and the object.
 pub struct CellClips<'a, F> {
     library: &'a Library,
     arm: Option<ArmClips<F>>,
     object: ObjectClips,
-    /// What a clip has of its own; the numbers of [`deviations`] follow.
-    own: &'static [Own],
     channels: Vec<Channel>,
     rows: Vec<Vec<Row>>,
-    /// For each clip and number of [`deviations`], what one unit of it takes off every residual.
+    /// What each clip has of its own: its friction first, the deviations of its path last.
+    random_effects: RandomEffects,
+    /// For each clip and deviation, what one unit of it takes off every residual.
     deviations: Vec<Vec<Vec<f64>>>,
-    scatter: Scatter,
     /// Index of the shared friction among the numbers.
     friction: Option<usize>,
     /// Indices of the joints' stiffnesses among them.
@@ -69,9 +62,9 @@ pub struct CellClips<'a, F> {
     contact: Vec<Contact>,
     /// For each clip the last numbers that the arm feels with its residuals there: most of what a search turns is the
     /// object's.
-    arm_alone: Vec<Recent<Vec<f64>>>,
+    arm_alone: Vec<Recent<Vec<f64>, Vec<f64>>>,
     /// By the twin since the touch, where a step or a point around which another program is looked at begins.
-    stepped_from: Vec<Recent<Vec<f64>>>,
+    stepped_from: Vec<Recent<Vec<f64>, Vec<f64>>>,
 }
 
 /// Measured less predicted of a clip, at shared numbers and its own.
@@ -97,12 +90,16 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             channels[..first].iter().filter(|channel| channel.quantity == "q").cloned().collect();
         channels.extend(encoders.into_iter().map(|encoder| Channel { group: Group::Contact, ..encoder }));
         let alone = arm.is_none();
+        let object =
+            object.with_nuisance(diagnosed(if alone { ClipKind::FreeMotion } else { ClipKind::ControlHitSlide }));
         let (mut rows, mut deviations, mut contact) = (Vec::new(), Vec::new(), Vec::new());
         for clip in 0..object.clips() {
             let of_arm = arm.as_ref().map_or(&[][..], |arm| arm.rows(clip));
             let joints = Contact::of(arm.as_ref(), &object, clip);
             let poses = pose_rows(&object, clip, first);
-            deviations.push(deviations::slopes((&object, alone), clip, of_arm.len(), joints.rows.len()));
+            let none = |rows: usize| vec![0.0; rows];
+            let padded = |slopes: Vec<f64>| [none(of_arm.len()), slopes, none(joints.rows.len())].concat();
+            deviations.push(object.path_slopes(clip).into_iter().map(padded).collect());
             rows.push([of_arm, &poses, &joints.evidence(&object.rows(clip), in_contact)].concat());
             contact.push(joints);
         }
@@ -110,19 +107,17 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         let friction = numbers().find(|(_, setting)| **setting == Setting::Friction).map(|(k, _)| k);
         let stiffness =
             numbers().filter(|(_, setting)| matches!(setting, Setting::Stiffness(_))).map(|(k, _)| k).collect();
-        let own = if alone { OF_OBJECTS_ALONE } else { OF_STROKES };
-        let scatter = scatter(&object, own, alone);
+        let random_effects = object.random();
         let arm_alone = rows.iter().map(|_| Recent::default()).collect();
         let stepped_from = rows.iter().map(|_| Recent::default()).collect();
         Self {
             library,
             arm,
             object,
-            own,
             channels,
             rows,
+            random_effects,
             deviations,
-            scatter,
             friction,
             stiffness,
             first,
@@ -135,7 +130,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     /// The residuals of the arm that moves alone at numbers; none where there is no arm.
     fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Vec<f64>>, Impossible> {
         let Some(arm) = &self.arm else { return Ok(Arc::default()) };
-        self.arm_alone[clip].at(&self.library.felt_by_arm(shared), || arm.simulated(clip, shared))
+        self.arm_alone[clip].at(self.library.felt_by_arm(shared), || arm.residuals_in(1, (clip, shared, &[])))
     }
 
     /// The residuals of the poses and of the joints in contact at numbers, a clip's own among them.
@@ -149,13 +144,12 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         errors: Errors,
         (clip, shared, own): (usize, &[f64], &[f64]),
     ) -> Result<Vec<f64>, Impossible> {
-        let mut shared = shared.to_vec();
-        if let (Some(friction), Some(own)) = (self.friction, own.get(FRICTION)) {
-            shared[friction] *= own.exp();
+        let (mut shared, mut simulated) = (shared.to_vec(), own.to_vec());
+        // The whole clip has its friction, not what comes after the hit alone.
+        if let (Some(friction), Some(ln_friction)) = (self.friction, simulated.first_mut().map(std::mem::take)) {
+            shared[friction] *= ln_friction.exp();
         }
-        let clock = self.own.iter().position(|number| *number == Own::Clock).and_then(|k| own.get(k)).copied();
-        let of_object = ALL.map(|number| if number == Own::Clock { clock.unwrap_or(0.0) } else { 0.0 });
-        let mut residuals = errors(&self.object, clip, &shared, &of_object)?;
+        let mut residuals = errors(&self.object, clip, &shared, &simulated)?;
         let (noise, contact) = (self.object.noise(), &self.contact[clip]);
         let joints: Vec<f64> = residuals[contact.rows.clone()].to_vec();
         residuals.truncate(self.poses(clip));
@@ -167,8 +161,10 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             let tips = row.stage != StageName::Rest && !IN_THE_PLANE.contains(&coordinate);
             *residual /= if tips { noise.hypot(tipping) } else { noise };
         }
-        for (slopes, value) in
-            self.deviations[clip].iter().zip(own.iter().skip(self.own.len())).filter(|(_, u)| **u != 0.0)
+        for (slopes, value) in self.deviations[clip]
+            .iter()
+            .zip(own.iter().skip(self.random_effects.heavy.start))
+            .filter(|(_, u)| **u != 0.0)
         {
             residuals.iter_mut().zip(&slopes[of_arm..]).for_each(|(residual, slope)| *residual += slope * value);
         }
@@ -189,7 +185,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         out.clear();
         match &self.arm {
             Some(arm) if reach != Reach::Object => {
-                arm.changed(clip, (shared, own), (reach, &base[..of_arm], Some(at)), out)?;
+                arm.stepped(clip, (shared, &[]), ((at.0, &[]), &base[..of_arm]), out)?;
             }
             _ => out.extend_from_slice(&base[..of_arm]),
         }
@@ -198,7 +194,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             return Ok(());
         }
         let twins = |(shared, own)| self.since_touch_by(ObjectClips::twins_errors, (clip, shared, own));
-        let before = self.stepped_from[clip].at(&[at.0, at.1].concat(), || twins(at))?;
+        let before = self.stepped_from[clip].at([at.0, at.1].concat(), || twins(at))?;
         let after = twins((shared, own))?;
         out.extend(base[of_arm..].iter().zip(&*before).zip(after).map(|((base, before), after)| base + after - before));
         Ok(())
@@ -213,15 +209,6 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     fn poses(&self, clip: usize) -> usize {
         self.rows[clip].len() - self.of_arm(clip) - self.contact[clip].rows.len()
     }
-}
-
-/// What clips have of their own as identification has it, and the deviations of paths; `alone`: of objects alone.
-fn scatter(object: &ObjectClips, own: &[Own], alone: bool) -> Scatter {
-    let kind = if alone { ClipKind::FreeMotion } else { ClipKind::ControlHitSlide };
-    let mut random: Vec<Random> =
-        own.iter().map(|own| Random { sigma: own.sigma(object.cell(), kind), ..own.random() }).collect();
-    random.extend(deviations::random(alone));
-    Scatter { heavy: own.len()..random.len(), forgiving: 1.0, random }
 }
 
 fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
@@ -316,11 +303,11 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Measured for CellClips<'_, F> {
         &self.rows[clip]
     }
 
-    fn scatter(&self) -> Scatter {
-        self.scatter.clone()
+    fn scatter(&self) -> RandomEffects {
+        self.random_effects.clone()
     }
 
     fn own_slope(&self, clip: usize, own: usize) -> Option<&[f64]> {
-        Some(self.deviations[clip].get(own.checked_sub(self.own.len())?)?)
+        Some(self.deviations[clip].get(own.checked_sub(self.random_effects.heavy.start)?)?)
     }
 }

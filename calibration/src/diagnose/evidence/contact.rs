@@ -36,7 +36,7 @@ impl Contact {
         let Some(arm) = arm else { return Self::default() };
         let rows = object.rows(clip);
         // The last of the rows of the arm alone may be read a period late.
-        let from_ns = arm.alone_until_ns(clip).saturating_add(TICK_NS);
+        let from_ns = arm.clip(clip).alone_until_ns.saturating_add(TICK_NS);
         let is_joint = |row: &object::Row| matches!(row.channel, object::Channel::Joint(_));
         let first = rows.iter().position(|row| is_joint(row) && row.stamp_ns >= from_ns).unwrap_or(rows.len());
         let ones = rows[first..].iter().filter(|row| row.channel == object::Channel::Joint(0));

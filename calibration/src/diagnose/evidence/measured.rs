@@ -1,74 +1,14 @@
-//! What the statistics are told: residuals of clips under the numbers of every hypothesis at once.
+//! What a likelihood is made of: residuals of clips under the parameters of every hypothesis at once.
 //!
-//! One vector holds the baseline's numbers and those of every effect of the library, each effect resting where it changes
-//! nothing. A hypothesis is a choice of which numbers are free; [`Selected`] makes it a [`ClipModel`] of its own.
+//! One vector holds the baseline's parameters and those of every effect of the library, each effect at its neutral value. A hypothesis
+//! is a choice of which of them are free.
 
-use super::scatter::{OwnNumbers, Scatter, WithOwn};
 use inference::engine::Engine;
-use inference::estimate::{ClipModel, Impossible, Unknown};
+use inference::estimate::{ClipModel, Impossible};
 use inference::forward::arm::following::Moment;
+use inference::forward::random_effects::{OwnNumbers, RandomEffects, WithOwn};
+pub use inference::forward::rows::{Channel, Group, Row, StageName};
 use std::sync::Arc;
-
-/// Part of a clip to which a channel's gap is counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum StageName {
-    /// The arm follows its command.
-    Control,
-    /// The object right after the hit.
-    Hit,
-    /// The object slides.
-    Slide,
-    /// The object rests: what is wrong there is seen wrongly.
-    Rest,
-}
-
-impl StageName {
-    /// Name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Control => "control",
-            Self::Hit => "hit",
-            Self::Slide => "slide",
-            Self::Rest => "rest",
-        }
-    }
-}
-
-/// Whose sensors a channel belongs to, and while what happens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Group {
-    /// The arm's, while it moves alone.
-    Arm,
-    /// The object's poses.
-    Object,
-    /// The arm's, from the first touch until the tool has let go of the object: its joints yield to the contact force.
-    Contact,
-}
-
-/// One measured quantity.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Channel {
-    /// What it is: `q`, `dq`, `tau_J`, `tau_J_d`, `position`, `rotation`.
-    pub quantity: &'static str,
-    /// Whose: `joint2`, `x`, `yaw`.
-    pub place: String,
-    /// The joint it belongs to, from 0; `None` for the object's.
-    pub joint: Option<usize>,
-    pub group: Group,
-}
-
-/// Where a residual stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row {
-    /// Index into [`Measured::channels`].
-    pub channel: usize,
-    /// Part of the clip.
-    pub stage: StageName,
-    /// What was going on: `forward`, `reversal`, `fast`.
-    pub regime: &'static str,
-    /// Seconds from the clip's start.
-    pub time: f64,
-}
 
 /// What a number can change of a clip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,7 +66,7 @@ pub trait Measured: ClipModel {
     /// The residuals of a clip, in the order of [`ClipModel::residuals`]; rows of one channel ascend in time.
     fn rows(&self, clip: usize) -> &[Row];
     /// What varies from clip to clip.
-    fn scatter(&self) -> Scatter;
+    fn scatter(&self) -> RandomEffects;
     /// Whether an object is in the clips, even where only the arm is looked at: a hit goes elsewhere with the least change of the
     /// gains, so these are fitted as exactly as they can be.
     fn has_object(&self) -> bool {
@@ -147,52 +87,3 @@ pub trait Measured: ClipModel {
 pub trait Evidence: Measured<Own = WithOwn> {}
 
 impl<E: Measured<Own = WithOwn>> Evidence for E {}
-
-/// A hypothesis on some of the clips: `free` numbers of `full`, every residual times the weight of its channel.
-pub struct Selected<'a, E> {
-    /// All clips, all numbers.
-    pub evidence: &'a E,
-    /// Numbers that are not free.
-    pub full: Vec<f64>,
-    /// Indices of the free ones.
-    pub free: Vec<usize>,
-    /// Indices of the clips that count.
-    pub clips: Vec<usize>,
-    /// Factor on the residuals of each channel.
-    pub weights: &'a [f64],
-}
-
-impl<E: Measured> Selected<'_, E> {
-    /// The full vector for values of the free numbers.
-    pub fn numbers(&self, shared: &[f64]) -> Vec<f64> {
-        let mut full = self.full.clone();
-        for (index, value) in self.free.iter().zip(shared) {
-            full[*index] = *value;
-        }
-        full
-    }
-
-    /// The free unknowns, beginning at the full vector's values.
-    pub fn unknowns(&self, all: &[Unknown]) -> Vec<Unknown> {
-        let of = |index: &usize| {
-            let unknown = &all[*index];
-            Unknown { start: self.full[*index].clamp(unknown.lower, unknown.upper), ..unknown.clone() }
-        };
-        self.free.iter().map(of).collect()
-    }
-}
-
-impl<E: Measured> ClipModel for Selected<'_, E> {
-    fn clips(&self) -> usize {
-        self.clips.len()
-    }
-
-    fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let clip = self.clips[clip];
-        self.evidence.residuals(clip, &self.numbers(shared), own, out)?;
-        for (residual, row) in out.iter_mut().zip(self.evidence.rows(clip)) {
-            *residual *= self.weights[row.channel];
-        }
-        Ok(())
-    }
-}

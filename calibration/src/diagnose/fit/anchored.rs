@@ -11,11 +11,11 @@
 
 use super::bench::Bench;
 use crate::diagnose::evidence::measured::{Channel, Evidence, Group, Measured, Near, Reach, Row};
-use crate::diagnose::evidence::recent::Recent;
-use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
 use inference::engine::Engine;
 use inference::estimate::{ClipModel, Impossible};
 use inference::forward::arm::following::Moment;
+use inference::forward::random_effects::{RandomEffects, WithOwn};
+use inference::forward::recent::Recent;
 use std::sync::Arc;
 
 /// Clips around a point where another program simulates strokes; elsewhere the clips as they are.
@@ -29,7 +29,7 @@ struct Around {
     point: Vec<f64>,
     nothing: Vec<f64>,
     /// Residuals there, clip by clip.
-    there: Vec<Recent<Vec<f64>>>,
+    there: Vec<Recent<Vec<f64>, Vec<f64>>>,
     /// By which kept work is told from that around other points.
     label: String,
 }
@@ -64,7 +64,7 @@ impl Around {
     }
 
     fn there(&self, whole: &impl Evidence, clip: usize) -> Result<Arc<Vec<f64>>, Impossible> {
-        self.there[clip].at(&self.point, || {
+        self.there[clip].at(self.point.clone(), || {
             let mut residuals = Vec::new();
             whole.residuals(clip, &self.point, &self.nothing, &mut residuals)?;
             Ok(residuals)
@@ -136,7 +136,7 @@ impl<E: Evidence> Measured for Anchored<'_, E> {
         self.whole.rows(clip)
     }
 
-    fn scatter(&self) -> Scatter {
+    fn scatter(&self) -> RandomEffects {
         self.whole.scatter()
     }
 
@@ -210,8 +210,8 @@ mod tests {
             &self.rows
         }
 
-        fn scatter(&self) -> Scatter {
-            Scatter::default()
+        fn scatter(&self) -> RandomEffects {
+            RandomEffects::default()
         }
     }
 

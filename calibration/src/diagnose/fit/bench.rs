@@ -5,8 +5,8 @@ use super::effort::Effort;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
 use crate::diagnose::evidence::measured::Measured;
-use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
 use crate::diagnose::library::Library;
+use inference::forward::random_effects::{RandomEffects, WithOwn};
 use inference::interrupt::Interrupt;
 use inference::kept::{Fingerprint, Trail};
 use nalgebra::{DMatrix, DVector};
@@ -19,7 +19,7 @@ pub struct Bench<'a, E> {
     pub evidence: &'a E,
     pub library: &'a Library,
     /// What varies from clip to clip.
-    pub scatter: Scatter,
+    pub scatter: RandomEffects,
     /// Whether the user asked for the end, or the time is spent.
     pub interrupt: &'a Interrupt,
     /// Where what is found is kept.

@@ -1,8 +1,7 @@
 //! What clips cost at numbers: squared weighted residuals, and the clips' own numbers in their sigmas.
 
 use super::bench::Bench;
-use crate::diagnose::evidence::measured::{Measured, Selected};
-use inference::estimate::ClipModel as _;
+use crate::diagnose::evidence::measured::Measured;
 use rayon::prelude::*;
 
 impl<E: Measured> Bench<'_, E> {
@@ -19,11 +18,10 @@ impl<E: Measured> Bench<'_, E> {
         weights: &[f64],
     ) -> Option<Vec<f64>> {
         let one = |(clip, own): &(usize, Vec<f64>)| {
-            let selected =
-                Selected { evidence: self.evidence, full: full.to_vec(), free: vec![], clips: vec![*clip], weights };
             let mut out = Vec::new();
-            selected.residuals(0, &[], own, &mut out).ok()?;
-            Some(out.iter().map(|r| r * r).sum::<f64>() + self.scatter.penalty(own))
+            self.evidence.residuals(*clip, full, own, &mut out).ok()?;
+            let weighted = out.iter().zip(self.evidence.rows(*clip)).map(|(r, row)| r * weights[row.channel]);
+            Some(weighted.map(|r| r * r).sum::<f64>() + self.scatter.penalty(own))
         };
         clips.par_iter().map(one).collect()
     }

@@ -140,11 +140,11 @@ impl<E: Measured> Bench<'_, E> {
 mod tests {
     use super::*;
     use crate::diagnose::evidence::measured::{Channel, Group, Row, StageName};
-    use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{bench, shipped};
     use inference::estimate::{ClipModel, Impossible};
+    use inference::forward::random_effects::{RandomEffects, WithOwn};
     use inference::forward::setting;
     use inference::interrupt::Interrupt;
     use shared_mem::msg::MAX_JOINTS;
@@ -199,8 +199,8 @@ mod tests {
             &self.rows
         }
 
-        fn scatter(&self) -> Scatter {
-            Scatter::default()
+        fn scatter(&self) -> RandomEffects {
+            RandomEffects::default()
         }
     }
 

@@ -76,10 +76,10 @@ fn outstanding(costs: &[f64]) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::diagnose::evidence::measured::{Channel, Group, Row, StageName};
-    use crate::diagnose::evidence::scatter::{Scatter, WithOwn};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{bench, shipped};
     use inference::estimate::{ClipModel, Impossible, Random};
+    use inference::forward::random_effects::{RandomEffects, WithOwn};
     use inference::forward::setting;
     use inference::interrupt::Interrupt;
     use shared_mem::msg::MAX_JOINTS;
@@ -114,9 +114,9 @@ mod tests {
             &self.1
         }
 
-        fn scatter(&self) -> Scatter {
+        fn scatter(&self) -> RandomEffects {
             let random = |name: &str, sigma| Random { name: name.into(), sigma, step: 1e-3 };
-            Scatter { random: vec![random("friction", SIGMA), random("x", 1.0)], heavy: 1..2, forgiving: 1.0 }
+            RandomEffects { random: vec![random("friction", SIGMA), random("x", 1.0)], heavy: 1..2, forgiving: 1.0 }
         }
     }
 

@@ -10,10 +10,10 @@
 //! them one by one ([`Precision::Exact`]).
 
 use crate::diagnose::evidence::measured::{Group, Measured, Reach};
-use crate::diagnose::evidence::scatter::Scatter;
-use crate::diagnose::evidence::scatter_scale::Around;
 use crate::diagnose::library::{Alternative, Library};
 use inference::estimate::{Eliminated, Impossible};
+use inference::forward::random_effects::RandomEffects;
+use inference::forward::random_effects_scale::Around;
 use inference::kept::numbers::matrix;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -54,7 +54,7 @@ pub struct Swept {
     /// What the columns are.
     pub columns: Vec<Column>,
     /// What varies from clip to clip.
-    pub scatter: Scatter,
+    pub scatter: RandomEffects,
     pub clips: Vec<SweptClip>,
 }
 
@@ -94,7 +94,7 @@ pub fn sweep(
     evidence: &impl Measured,
     library: &Library,
     point: &Point<'_>,
-    scatter: &Scatter,
+    scatter: &RandomEffects,
     go_on: &(impl Fn(f64) -> bool + Sync),
 ) -> Result<Swept, Impossible> {
     let mut columns: Vec<Column> = point.free.iter().map(|k| Column::Number(*k)).collect();
@@ -152,7 +152,7 @@ struct Work<'a, E, G> {
     full: &'a [f64],
     columns: &'a [Column],
     batches: &'a [Batch],
-    scatter: &'a Scatter,
+    scatter: &'a RandomEffects,
     go_on: &'a G,
 }
 

@@ -71,11 +71,11 @@ mod tests {
     use super::super::score::Predicted;
     use super::*;
     use crate::diagnose::clips::ground::Ground;
-    use crate::diagnose::evidence::scatter_scale::Around;
     use crate::diagnose::fit::bench::{FittedClip, Hypothesis};
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::fit::sweep::Reduced;
     use crate::diagnose::test_bench::shipped;
+    use inference::forward::random_effects_scale::Around;
     use inference::forward::setting;
     use nalgebra::DMatrix;
     use shared_mem::msg::MAX_JOINTS;

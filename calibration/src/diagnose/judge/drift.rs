@@ -4,9 +4,9 @@
 //! through the logarithm of their friction, in the order in which they were recorded, tells (Student's t of its slope), if it
 //! leads further than clips scatter.
 
-use crate::diagnose::evidence::scatter::Scatter;
 use crate::diagnose::fit::bench::Hypothesis;
-use inference::forward::object::Own;
+use inference::forward::object::Nuisance;
+use inference::forward::random_effects::RandomEffects;
 use inference::statistics::student_sigmas;
 
 /// A slope of so many sigmas of a normal distribution, or as unlikely a one of few clips, is no chance: p = 0.02.
@@ -17,8 +17,8 @@ const LEAST: f64 = 6.0;
 const FEWEST: usize = 5;
 
 /// How much the friction of the last clip is over that of the first, less 1; `None` where it does not drift.
-pub fn of_friction(scatter: &Scatter, hypothesis: &Hypothesis) -> Option<f64> {
-    let name = Own::LnFriction.name();
+pub fn of_friction(scatter: &RandomEffects, hypothesis: &Hypothesis) -> Option<f64> {
+    let name = Nuisance::LnFriction.name();
     let number = scatter.random.iter().position(|random| random.name == name)?;
     let points: Vec<(f64, f64)> =
         hypothesis.fitted.iter().map(|fitted| (fitted.clip as f64, fitted.own[number])).collect();
@@ -46,7 +46,7 @@ fn trend(points: &[(f64, f64)]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Scatter of 0.02 without order, on eight clips, with a rise on top.
+    /// RandomEffects of 0.02 without order, on eight clips, with a rise on top.
     fn clips(rise: f64) -> Vec<(f64, f64)> {
         let scatter = [0.013, -0.022, 0.005, 0.031, -0.018, 0.009, -0.027, 0.016];
         scatter.iter().enumerate().map(|(k, own)| (2.0 * k as f64, own + rise * k as f64 / 7.0)).collect()

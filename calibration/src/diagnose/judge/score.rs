@@ -6,10 +6,10 @@
 
 use super::held_out::Fits;
 use crate::diagnose::evidence::measured::Evidence;
-use crate::diagnose::evidence::scatter_scale::{Around, at_the_best_scale};
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
 use crate::diagnose::fit::left_out::shift_to;
 use crate::diagnose::fit::quadratic::value;
+use inference::forward::random_effects_scale::{Around, at_the_best_scale};
 use inference::statistics::median;
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.

@@ -6,7 +6,6 @@ use super::screening::arm_gap_is_open;
 use super::starts;
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::evidence::measured::{Channel, Evidence, Measured, Near, Reach, Row};
-use crate::diagnose::evidence::scatter::{Scatter, WithoutOwn};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
 use crate::diagnose::fit::{stages, undetermined};
@@ -14,6 +13,7 @@ use crate::diagnose::judge::trial::Step;
 use crate::page::words;
 use inference::estimate::{ClipModel, Impossible};
 use inference::forward::arm::following::Moment;
+use inference::forward::random_effects::{RandomEffects, WithoutOwn};
 use shared_mem::progress::Progress;
 
 /// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there.
@@ -25,7 +25,7 @@ pub struct ArmAlone<'a, E>(pub &'a E);
 impl<E: Evidence> ArmAlone<'_, E> {
     /// A bench for these.
     pub fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
-        let (evidence, scatter) = (self, Scatter::default());
+        let (evidence, scatter) = (self, RandomEffects::default());
         let trail = (whole.trail.0, "the arm alone");
         Bench { evidence, library: whole.library, scatter, interrupt: whole.interrupt, trail }
     }
@@ -137,8 +137,8 @@ impl<E: Evidence> Measured for ArmAlone<'_, E> {
         self.0.rows(clip)
     }
 
-    fn scatter(&self) -> Scatter {
-        Scatter::default()
+    fn scatter(&self) -> RandomEffects {
+        RandomEffects::default()
     }
 
     fn has_object(&self) -> bool {

@@ -2,11 +2,11 @@
 
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::evidence::measured::Evidence;
-use crate::diagnose::evidence::scatter_scale;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::{self, Scored};
 use crate::diagnose::fit::sweep::{Point, Precision, Swept, sweep};
 use crate::diagnose::fit::{floor, stages};
+use inference::forward::random_effects_scale;
 use nalgebra::DMatrix;
 use shared_mem::progress::Progress;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -43,7 +43,7 @@ fn taken<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, ba
     };
     let scored = scores(&swept)?;
     // Where clips of the right hypothesis scatter little, the usual scatter hides a small effect altogether.
-    swept.scatter = bench.scatter.narrowed(scatter_scale::LEAST);
+    swept.scatter = bench.scatter.narrowed(random_effects_scale::MIN_SCALE);
     let narrow = scores(&swept)?;
     Some((weights, scored, narrow))
 }

@@ -349,7 +349,7 @@ mod tests {
         let well = World::draw(3, Kind::Excitation, Fault::Nothing, &cell);
         let base = setting::complete(&cell, Some(&well.hidden)).expect("a cell");
         let arm =
-            ArmClips::new(&cell, &record(&well, 2).expect("a session"), |_: &[f64]| base.clone()).expect("an arm");
+            ArmClips::moments(&cell, &record(&well, 2).expect("a session"), |_: &[f64]| base.clone()).expect("an arm");
         let peaks = arm.peaks(&[]).expect("it can be simulated");
         // Two joints are cut short, each to its own share of what it needs.
         let shares = [None, Some(0.8), None, Some(0.88), None, None, None];

@@ -105,8 +105,9 @@ fn delay(numbers: &[f64], model: &Model<'_>, clips: &Used) -> Option<(f64, f64)>
     let mut sums = vec![[0.0; 3]; dof];
     for clip in clips.split.train.iter().take(CLIPS) {
         let predicted = model.predict(*clip, numbers, &[]).ok()?;
-        let measured = &model.clip(*clip).measured;
-        let rows: Vec<usize> = model.averaged(*clip).iter().map(|bin| bin.start).collect();
+        let clip = model.clip(*clip);
+        let measured = &clip.recorded.measured;
+        let rows: Vec<usize> = clip.averaged().map(|bin| bin[0]).collect();
         for (joint, sums) in sums.iter_mut().enumerate() {
             let q = |row: usize| measured.q_row(row)[joint];
             let seconds = |a: usize, b: usize| (measured.stamps_ns[b] - measured.stamps_ns[a]) as f64 * 1e-9;

@@ -6,7 +6,6 @@ use crate::identify::answer::{ClipGap, Figures, Gap, Identification};
 use crate::identify::run::RunError;
 use crate::page::Trace;
 use inference::estimate::{Options, Random, Subset, score};
-use inference::forward::arm::Channel;
 use rayon::prelude::*;
 
 /// Points of a picture's line.
@@ -84,20 +83,20 @@ fn one(
     let joint_rms_rad = joint_rms(&after);
     let worst = (0..joint_rms_rad.len()).max_by(|a, b| joint_rms_rad[*a].total_cmp(&joint_rms_rad[*b])).unwrap_or(0);
     let trace = Trace {
-        clip: model.name(clip),
+        clip: model.clip(clip).name(),
         channel: format!("joint {}", worst + 1),
         unit: "rad".into(),
-        sigma: model.sigma(Channel::Position, worst),
+        sigma: model.sigma()[worst],
         before: before.as_ref().map_or_else(Vec::new, |errors| line(errors, worst)),
         after: line(&after, worst),
     };
     let gap = ClipGap {
-        file: model.name(clip),
+        file: model.clip(clip).name(),
         used: used.into(),
         before: before.as_ref().map_or_else(Figures::default, figures),
         after: figures(&after),
         joint_rms_rad,
-        warnings: model.warnings(clip).to_vec(),
+        warnings: model.clip(clip).warnings.clone(),
     };
     Ok((gap, trace))
 }
@@ -110,12 +109,13 @@ fn errors(model: &Model<'_>, clip: usize, random: &[Random], numbers: &[f64]) ->
         Vec::new()
     };
     let predicted = model.predict(clip, numbers, &own)?;
-    let measured = &model.clip(clip).measured;
+    let clip = model.clip(clip);
+    let measured = &clip.recorded.measured;
     let (mut times, mut rows) = (Vec::new(), Vec::new());
-    for row in model.averaged(clip).iter().flat_map(Clone::clone) {
+    for row in clip.averaged().flatten().copied() {
         times.push((measured.stamps_ns[row] - measured.stamps_ns[0]) as f64 * 1e-9);
         let pairs = measured.q_row(row).iter().zip(&predicted[row].state.q).enumerate();
-        rows.push(pairs.map(|(joint, (q, p))| if model.is_dead(clip, joint) { 0.0 } else { q - p }).collect());
+        rows.push(pairs.map(|(joint, (q, p))| if clip.dead[joint] { 0.0 } else { q - p }).collect());
     }
     Ok(Errors { times, rows })
 }

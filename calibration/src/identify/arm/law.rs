@@ -1,7 +1,7 @@
 //! Which control law leads the arm, where cell.toml does not say: gains are fitted under each law, and the one that leaves the least of
 //! the joints' motion is taken.
 
-use super::{ArmError, Numbers, begun, session};
+use super::{ArmError, Numbers, begun};
 use inference::estimate::{ClipModel as _, Options as FitOptions, fit};
 use inference::forward::Settings;
 use inference::forward::arm::ArmClips;
@@ -69,7 +69,7 @@ fn left_under(
     let (settings, unknowns): (Vec<_>, Vec<_>) = arm_numbers(cell, &base).into_iter().unzip();
     let settings = Settings::new(base, settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
-    let (model, _) = ArmClips::new(cell, clips.to_vec(), session::CHANNELS, numbers)?;
+    let (model, _) = ArmClips::means(cell, clips.to_vec(), numbers)?;
     if model.clips() == 0 {
         return Ok(None);
     }

@@ -165,7 +165,7 @@ fn identify_kept(
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(&cell, &base, &options.also)?.into_iter().unzip();
     let settings = Settings::new(base, settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
-    let (model, unusable) = ArmClips::new(&cell, clips, session::CHANNELS, numbers)?;
+    let (model, unusable) = ArmClips::means(&cell, clips, numbers)?;
     let mut model = model.moved_by(options.engine.clone(), &complete(&cell, None)?);
     let clips = session::used(&options.session, &model, left_out, unusable, options.seed)?;
     let free = unknowns.clone();
@@ -249,7 +249,7 @@ pub fn begun(cell: &Cell, clips: &[&Clip], base: &Theta, interrupt: &Interrupt) 
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = arm_numbers(cell, base).into_iter().unzip();
     let settings = Settings::new(base.clone(), settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
-    let (model, _) = ArmClips::new(cell, clips, session::CHANNELS, numbers)?;
+    let (model, _) = ArmClips::means(cell, clips, numbers)?;
     let all: Vec<usize> = (0..model.clips()).collect();
     start::improve(cell, &model, &all, settings.settings(), &mut unknowns, interrupt);
     Ok(settings.theta(&unknowns.iter().map(|unknown| unknown.start).collect::<Vec<_>>()))

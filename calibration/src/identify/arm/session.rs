@@ -6,14 +6,11 @@ use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
 use inference::estimate::{ClipModel as _, Unknown};
 use inference::forward::Setting;
-use inference::forward::arm::{Channel, LeftOut};
+use inference::forward::arm::LeftOut;
 use rayon::prelude::*;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ReadError, Session};
 use std::path::Path;
-
-/// What the twin is held against: what every robot logs, and what a controller is judged by.
-pub(super) const CHANNELS: &[Channel] = &[Channel::Position];
 
 /// A session in memory.
 pub(super) struct Material {
@@ -58,9 +55,9 @@ pub(super) fn used(
         let why = if reasons.is_empty() { "it lists none with an arm".into() } else { reasons };
         return Err(ArmError::NoClip { session: path.display().to_string(), why });
     }
-    let clips: Vec<&Clip> = (0..model.clips()).map(|clip| model.clip(clip)).collect();
+    let clips: Vec<&Clip> = (0..model.clips()).map(|clip| &model.clip(clip).recorded).collect();
     let split = split(&clips, seed);
-    let names = |numbers: &[usize]| numbers.iter().map(|clip| model.name(*clip)).collect();
+    let names = |numbers: &[usize]| numbers.iter().map(|clip| model.clip(*clip).name()).collect();
     let (train, holdout) = (names(&split.train), names(&split.holdout));
     let mut warnings = Vec::new();
     if split.holdout.is_empty() {
@@ -111,7 +108,7 @@ pub(super) fn hold_dead(model: &Model<'_>, clips: &Used, settings: &[Setting], u
     for (setting, unknown) in settings.iter().zip(unknowns) {
         let gain = matches!(setting, Setting::Stiffness(_) | Setting::Damping(_));
         let Some(joint) = joint_of(setting).filter(|_| gain) else { continue };
-        if clips.split.train.iter().all(|clip| model.stands_still(*clip, joint)) {
+        if clips.split.train.iter().all(|clip| model.clip(*clip).stands_still(joint)) {
             (unknown.lower, unknown.upper) = (unknown.start, unknown.start);
         }
     }

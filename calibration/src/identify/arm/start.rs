@@ -5,7 +5,6 @@ use super::Model;
 use super::session::joint_of;
 use inference::estimate::{ClipModel as _, Unknown};
 use inference::forward::Setting;
-use inference::forward::arm::Row;
 use inference::interrupt::Interrupt;
 use rayon::prelude::*;
 use shared_mem::cell::Cell;
@@ -108,8 +107,8 @@ pub(super) fn costs(model: &Model<'_>, clips: &[usize], numbers: &[f64]) -> Join
         if model.residuals(*clip, numbers, &[], &mut out).is_err() {
             return [f64::INFINITY; MAX_JOINTS];
         }
-        for (Row { joint, .. }, residual) in model.rows(*clip).zip(&out) {
-            sums[joint] += residual * residual;
+        for (row, residual) in model.rows(*clip).iter().zip(&out) {
+            sums[row.channel] += residual * residual;
         }
     }
     sums

@@ -5,9 +5,7 @@
 //! terms of higher order (Richardson 1911). The numbers move by one Gauss-Newton step of that difference.
 
 use super::Model;
-use inference::estimate::{
-    ClipFit, ClipModel as _, Fit, Impossible, Random, Shifted, Subset, Unknown, at_bounds, moved_by,
-};
+use inference::estimate::{ClipFit, Fit, Impossible, Random, Shifted, Subset, Unknown, at_bounds, moved_by};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -28,9 +26,8 @@ pub(super) fn error(
 ) -> Result<Vec<f64>, Impossible> {
     let jobs: Vec<(&usize, &ClipFit)> = train.iter().zip(&fit.clips).collect();
     let off = |(clip, linear): &(&usize, &ClipFit)| {
-        let [mut whole, mut halves] = [Vec::new(), Vec::new()];
-        model.residuals(**clip, &fit.shared, &linear.own, &mut whole)?;
-        model.residuals_in(2, (**clip, &fit.shared, &linear.own), &mut halves)?;
+        let in_parts = |parts| model.residuals_in(parts, (**clip, &fit.shared, &linear.own));
+        let (whole, mut halves) = (in_parts(1)?, in_parts(2)?);
         halves.iter_mut().zip(&whole).for_each(|(half, whole)| *half = EXTRAPOLATED * (*half - whole));
         Ok(halves)
     };
@@ -62,7 +59,7 @@ mod tests {
     use crate::identify::arm::Numbers;
     use inference::estimate::{Options, fit};
     use inference::forward::Settings;
-    use inference::forward::arm::{ArmClips, CHANNELS};
+    use inference::forward::arm::ArmClips;
     use inference::forward::setting::{arm_numbers, complete};
     use shared_mem::cell::Cell;
     use std::path::Path;
@@ -79,7 +76,7 @@ mod tests {
         let settings = Settings::new(base, settings);
         let model = |clips| -> Model<'_> {
             let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
-            ArmClips::new(&cell, clips, &CHANNELS, numbers).expect("an arm").0
+            ArmClips::means(&cell, clips, numbers).expect("an arm").0
         };
         let truth: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
         // Without noise nothing but the step is left.

@@ -99,7 +99,7 @@ fn partner(finding: &Finding<'_>, k: usize) -> Option<(String, f64)> {
 /// Farthest travel of a joint's command in a clip that was fitted [rad].
 fn commanded(joint: usize, model: &Model<'_>, clips: &Used) -> f64 {
     let travel = |clip: &usize| {
-        let desired = &model.clip(*clip).desired;
+        let desired = &model.clip(*clip).recorded.desired;
         let values = desired.q.iter().skip(joint).step_by(desired.dof.max(1));
         let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), q| (lo.min(*q), hi.max(*q)));
         hi - lo

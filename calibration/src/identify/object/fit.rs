@@ -9,7 +9,7 @@
 use super::step::{Linearised, Question};
 use super::vicinity::points;
 use inference::estimate::{ClipModel as _, Impossible, Random, Unknown};
-use inference::forward::object::{ALL, Channel, ModelError, ObjectClips, Own, Part};
+use inference::forward::object::{Channel, ModelError, ObjectClips, Part};
 use inference::kept::{Fingerprint, Kept, Trail};
 use rayon::prelude::*;
 use shared_mem::cell::PoseNoise;
@@ -64,7 +64,7 @@ pub(super) fn fit_object(
 ) -> Result<ObjectFit, Impossible> {
     let mut search = Search::new(trail, &watch);
     let mut at = search.first(clips, unknowns, start, FIRST_STEPS)?;
-    let random = scattered(clips);
+    let random = clips.random().random;
     for _ in 0..ROUNDS {
         if search.stopped {
             break;
@@ -107,7 +107,7 @@ pub(super) fn linearise_object(
     at: &[f64],
 ) -> Result<Linearised, Impossible> {
     clips.set_model_error(FIRST_ERROR);
-    let random = scattered(clips);
+    let random = clips.random().random;
     let own = vec![vec![0.0; random.len()]; clips.clips()];
     let first = Question { clips, unknowns, random: &random }.here(at, &own)?;
     clips.set_model_error(model_error(clips, &first)?);
@@ -122,7 +122,7 @@ pub(super) fn linearise_object(
 /// As [`linearise_object`].
 pub(super) fn widths(clips: &ObjectClips, unknowns: &[Unknown], at: &Linearised) -> Result<Vec<f64>, Impossible> {
     let half = at.estimate(unknowns).2.half_width;
-    Ok(Question { clips, unknowns, random: &scattered(clips) }.widths(at, &half)?.0)
+    Ok(Question { clips, unknowns, random: &clips.random().random }.widths(at, &half)?.0)
 }
 
 struct Search<'a, W> {
@@ -184,18 +184,9 @@ impl<'a, W: Fn(&[f64], usize) -> bool> Search<'a, W> {
     }
 }
 
-/// All own numbers held.
+/// All nuisance parameters held.
 fn held(clips: &ObjectClips) -> Vec<Random> {
-    clips.random().into_iter().map(|effect| Random { sigma: 0.0, ..effect }).collect()
-}
-
-/// Friction, clock and, of an object that was let go, its first motion vary from clip to clip; what a hit leaves behind
-/// is in the model's error.
-fn scattered(clips: &ObjectClips) -> Vec<Random> {
-    let counts =
-        |own: Own| !matches!(own, Own::Release(_) | Own::ReleaseYaw | Own::ReleaseVelocity(_) | Own::ReleaseSpin);
-    let sigma = |(effect, own): (Random, Own)| if counts(own) { effect } else { Random { sigma: 0.0, ..effect } };
-    clips.random().into_iter().zip(ALL).map(sigma).collect()
+    clips.random().random.into_iter().map(|effect| Random { sigma: 0.0, ..effect }).collect()
 }
 
 /// What is left of hits and rests with every clip's own numbers at their best. Of a clip that nothing fits, as much as

@@ -42,7 +42,7 @@ use finding::Finding;
 use fit::{ObjectFit, fit_object, linearise_object};
 use inference::engine::{Engine, EngineError, Used};
 use inference::estimate::{Impossible, Options as FitOptions, Unknown, fit as fit_clips};
-use inference::forward::arm::{ArmClips, Channel};
+use inference::forward::arm::ArmClips;
 use inference::forward::object::ObjectClips;
 use inference::forward::setting::{BaseError, arm_numbers, complete, object_parameters};
 use inference::forward::{Setting, Settings};
@@ -331,7 +331,7 @@ fn with_gains(
     let base = complete(cell, Some(given))?;
     let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = arm_numbers(cell, &base).into_iter().unzip();
     let settings = Settings::new(base, settings);
-    let (clips, _) = ArmClips::new(cell, clips, &[Channel::Position], |numbers: &[f64]| settings.theta(numbers))?;
+    let (clips, _) = ArmClips::means(cell, clips, |numbers: &[f64]| settings.theta(numbers))?;
     let clips = clips.moved_by(engine, &complete(cell, None)?);
     let fit = fit_clips(&clips, &unknowns, &clips.random(), &FitOptions::default(), |_, _| !interrupt.asked())?;
     Ok(Theta { arm: settings.theta(&fit.shared).arm, ..given.clone() })

@@ -2,7 +2,8 @@
 //! simulated, rows that are averaged, joints that are dead. Stamps of the recording, SI.
 
 use super::velocity;
-use shared_mem::cell::{Cell, ClipKind, PoseNoise};
+use crate::forward::object::noise_of;
+use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::{Clip, JointSeries, ReadError};
 use shared_mem::time::seconds_between;
@@ -23,8 +24,6 @@ const STRETCH: f64 = 0.7;
 const BEFORE_MOTION_NS: u64 = 150_000_000;
 /// An object moves when a pose is so many sigmas from the first ones.
 const MOVED_SIGMAS: f64 = 6.0;
-/// What the tracker's noise is taken for where cell.toml does not tell it [m].
-const POSE_NOISE: f64 = 1e-3;
 /// A command that moves a joint this far should show [rad].
 const COMMANDED: f64 = 0.02;
 /// A joint that follows less than this share of its command is dead.
@@ -79,27 +78,43 @@ pub enum ArmClipError {
 
 /// A prepared clip.
 #[derive(Debug, Clone)]
-pub(super) struct ArmClip {
-    pub(super) recorded: Clip,
+pub struct ArmClip {
+    /// Joints in the model's order.
+    pub recorded: Clip,
     pub(super) commands: CommandTrack,
-    /// Measured rows that are simulated in one go, each stretch from its own start.
-    pub(super) runs: Vec<Range<usize>>,
-    /// Measured rows that are averaged, ascending.
+    /// Measured rows that count.
+    pub(super) rows: Vec<usize>,
+    /// The row of the commands at each of them, where the torques that were asked for count.
+    pub(super) desired_rows: Vec<usize>,
+    /// When the twin is asked what the sensors read [ns]: once or more often for each of these.
+    pub(super) asked_ns: Vec<u64>,
+    /// What of it is simulated in one go, each from its own start.
+    pub(super) runs: Vec<Run>,
+    /// Which of `rows` are averaged, ascending.
     pub(super) bins: Vec<Range<usize>>,
+    /// From here on the tool may touch the object [ns].
+    pub alone_until_ns: u64,
     /// Joints that do not follow, or whose readings stand still.
-    pub(super) dead: [bool; MAX_JOINTS],
+    pub dead: [bool; MAX_JOINTS],
     /// The commands as they were given, where dead joints were told to stay instead.
-    given: Option<JointSeries>,
-    /// Row of the desired series at each measured row, where one was logged at that time.
-    pub(super) desired_rows: Vec<Option<usize>>,
+    pub(super) given: Option<JointSeries>,
     /// What a reader has to know, one sentence each.
-    pub(super) warnings: Vec<String>,
-    /// Bins of a witness.
+    pub warnings: Vec<String>,
+    /// Bins of a witness; 0 where the whole clip is one.
     pub(super) stretch: usize,
     /// Stretches of one clock and without a hole in the commands, from stamp to stamp [ns].
-    pieces: Vec<RangeInclusive<u64>>,
+    pub(super) pieces: Vec<RangeInclusive<u64>>,
     /// How much of it can be simulated before an object is touched [s].
-    seconds: f64,
+    pub(super) seconds: f64,
+}
+
+/// A part of a clip that is simulated in one go.
+#[derive(Debug, Clone)]
+pub(super) struct Run {
+    /// The measured row at which it begins.
+    pub(super) from: usize,
+    /// Which of the stamps that are asked for lie in it.
+    pub(super) asked: Range<usize>,
 }
 
 impl ArmClip {
@@ -147,17 +162,39 @@ impl ArmClip {
             warnings.push(format!("the robot's clock jumps by {by:.3} s at {at:.3} s: what follows was left out"));
         }
         let pieces = pieces(&recorded, &commands, until_ns);
-        let runs = runs(&recorded.measured.stamps_ns, &pieces, contact_ns(&recorded, cell));
-        let bins = bins(&recorded.measured.stamps_ns, &runs, step_ns);
-        let left = bins.iter().map(Range::len).sum::<usize>() as f64 / rate;
-        let stretches = (left / STRETCH).round().max(1.0) as usize;
-        let desired_rows = desired_rows(&recorded);
+        let alone_until_ns = contact_ns(&recorded, cell);
+        let simulated = runs(&recorded.measured.stamps_ns, &pieces, alone_until_ns);
+        let rows: Vec<usize> = simulated.iter().flat_map(Clone::clone).collect();
+        let asked_ns: Vec<u64> = rows.iter().map(|row| recorded.measured.stamps_ns[*row]).collect();
+        let mut runs: Vec<Run> = Vec::new();
+        for run in simulated {
+            let begins = runs.last().map_or(0, |run| run.asked.end);
+            runs.push(Run { from: run.start, asked: begins..begins + run.len() });
+        }
+        let bins = bins(&asked_ns, &runs, step_ns);
+        let seconds = rows.len() as f64 / rate;
+        let stretches = (seconds / STRETCH).round().max(1.0) as usize;
         let stretch = bins.len().div_ceil(stretches);
-        Ok(Self { recorded, commands, runs, bins, dead, given, desired_rows, warnings, stretch, pieces, seconds: left })
+        Ok(Self {
+            recorded,
+            commands,
+            rows,
+            desired_rows: Vec::new(),
+            asked_ns,
+            runs,
+            bins,
+            alone_until_ns,
+            dead,
+            given,
+            warnings,
+            stretch,
+            pieces,
+            seconds,
+        })
     }
 
-    /// Whether a joint is dead and told to stay where it is.
-    pub(super) fn stands_still(&self, joint: usize) -> bool {
+    /// Whether a joint is dead and told to stay where it is, rather than to follow its commands unseen.
+    pub fn stands_still(&self, joint: usize) -> bool {
         self.dead[joint] && self.given.is_some()
     }
 
@@ -183,11 +220,6 @@ impl ArmClip {
         if self.seconds < SHORTEST { Err(ArmClipError::Short(self.seconds)) } else { Ok(self) }
     }
 
-    /// The last row that is simulated in one go with this one.
-    pub(super) fn last_row(&self, row: usize) -> usize {
-        self.runs.iter().find(|run| run.contains(&row)).map_or(row, |run| run.end - 1)
-    }
-
     /// The longest stretch of one clock and without a hole, where there is more than one of them or something is cut off.
     pub(super) fn longest_stretch(&self) -> Option<RangeInclusive<u64>> {
         let last = self.recorded.desired.stamps_ns.last().copied()?;
@@ -196,14 +228,24 @@ impl ArmClip {
         longest.filter(|_| !whole).cloned()
     }
 
-    pub(super) fn name(&self) -> String {
-        let file = &self.recorded.file;
-        file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned()
+    /// Name of its file.
+    pub fn name(&self) -> String {
+        name(&self.recorded)
+    }
+
+    /// Measured rows that count, in the groups that are averaged.
+    pub fn averaged(&self) -> impl Iterator<Item = &[usize]> {
+        self.bins.iter().map(|bin| &self.rows[bin.clone()])
     }
 }
 
+/// Name of a clip's file.
+pub(super) fn name(clip: &Clip) -> String {
+    clip.file.file_name().unwrap_or(clip.file.as_os_str()).to_string_lossy().into_owned()
+}
+
 /// Median distance of the stamps [ns].
-pub(super) fn usual_step(stamps_ns: &[u64]) -> u64 {
+fn usual_step(stamps_ns: &[u64]) -> u64 {
     let mut steps: Vec<u64> = stamps_ns.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_unstable();
     steps.get(steps.len() / 2).copied().unwrap_or(1).max(1)
@@ -273,8 +315,7 @@ fn warnings(clip: &Clip, commands: &CommandTrack, dead: &[bool; MAX_JOINTS]) -> 
 fn contact_ns(clip: &Clip, cell: &Cell) -> u64 {
     let poses = &clip.object.poses;
     let (ClipKind::ControlHitSlide, Some(first)) = (clip.kind, poses.first()) else { return u64::MAX };
-    let noise = cell.object().and_then(|object| object.pose_noise);
-    let sigma = noise.map_or(POSE_NOISE, |PoseNoise { position, .. }| position);
+    let sigma = noise_of(cell).position;
     let away = |i: &usize| {
         let (a, b) = (poses[*i].position(), first.position());
         // The first pose is as noisy as the others.
@@ -304,10 +345,10 @@ fn runs(rows: &[u64], pieces: &[RangeInclusive<u64>], until_ns: u64) -> Vec<Rang
     pieces.iter().map(run).filter(|run| run.len() > 1).collect()
 }
 
-fn bins(stamps_ns: &[u64], runs: &[Range<usize>], step_ns: u64) -> Vec<Range<usize>> {
+fn bins(stamps_ns: &[u64], runs: &[Run], step_ns: u64) -> Vec<Range<usize>> {
     let rows = ((AVERAGED_NS + step_ns / 2) / step_ns).max(1) as usize;
     let mut bins = Vec::new();
-    for run in runs {
+    for run in runs.iter().map(|run| &run.asked) {
         let mut from = run.start;
         while from < run.end {
             let together = |row: &usize| stamps_ns[*row] - stamps_ns[from] < AVERAGED_NS;
@@ -320,7 +361,7 @@ fn bins(stamps_ns: &[u64], runs: &[Range<usize>], step_ns: u64) -> Vec<Range<usi
 }
 
 /// For every measured row the desired one of the same moment; `None` where that was not logged.
-pub fn desired_rows(clip: &Clip) -> Vec<Option<usize>> {
+pub(super) fn desired_rows(clip: &Clip) -> Vec<Option<usize>> {
     let step_ns = usual_step(&clip.measured.stamps_ns);
     let desired = &clip.desired.stamps_ns;
     let row_at = |stamp: &u64| {

@@ -1,73 +1,55 @@
 //! Clips with an arm: what the twin makes of every clip under any parameters, and how far that is from what the robot
 //! logged. Called by identification and by the diagnosis. Base frame, SI.
 //!
-//! Rows are averages over 5 ms (single rows of slower logs), each in sigmas of its noise, which is estimated from the log
-//! itself. Rows of a clip in their order: by time, then channel, then joint. Clips with an object count until the tool
-//! may touch it.
+//! Residuals are in sigmas of their noise, which is estimated from the log itself. Clips with an object count until the tool may touch
+//! it: the arm alone is simulated.
 //!
 //! | file | owns |
 //! |---|---|
 //! | `clip` | a recorded clip, prepared, or the reason why it cannot be used |
+//! | `moments` | one that was prepared before, looked at at single rows |
 //! | `piece` | the part of a clip that can be simulated in one go |
 //! | `following` | what the law had to work with, and what that took of the model, along the measured motion |
 //! | `encoder_age` | how old encoder readings are when controller and log get them |
-//! | `noise` | how noisy a signal is |
-//! | `torque_time` | which control period a logged torque belongs to |
-#![allow(non_snake_case)] // the Franka Control Interface's own symbols
+//! | `noise` | how noisy a signal is, and how quiet a sensor can be |
+//! | `regime` | what a joint is commanded to do at a moment |
+//! | `residuals` | what the sensors would have read, against what they read |
+//! | `velocity` | whether logged velocities are the slopes of the positions |
 
 mod clip;
 mod encoder_age;
 pub mod following;
+mod moments;
 pub mod noise;
 mod piece;
-mod torque_time;
+mod regime;
+mod residuals;
 pub mod velocity;
 
-pub use clip::ArmClipError;
-pub use clip::desired_rows;
+pub use clip::{ArmClip, ArmClipError};
 pub use piece::one_piece;
 
-use super::motion::{Mover, Stretch};
+use super::motion::Mover;
+use super::recent::Recent;
+use super::rows::{Channel, Group, Row};
 use crate::engine::{Engine, Quantity};
 use crate::estimate::{ClipModel, Impossible, Random};
-use clip::ArmClip;
-use shared_mem::cell::Cell;
+use following::Moment;
+use regime::Regimes;
+use residuals::{rows, sensor_sigma, series};
+use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
-use std::ops::Range;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use twin::arm::{ArmModel, ModelError};
 use twin::control::Reading;
 
-/// What a robot logs about a joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Channel {
-    /// Position q [rad].
-    Position,
-    /// Velocity dq [rad/s].
-    Velocity,
-    /// Torque behind the gear with gravity, tau_J [N m].
-    Torque,
-    /// Torque asked for without gravity, tau_J_d [N m].
-    DesiredTorque,
-}
+/// What a robot logs of its joints, in the order of the channels.
+const QUANTITIES: [&str; 4] = ["q", "dq", "tau_J", "tau_J_d"];
+/// Where the arm goes along what was measured: the torque that this takes.
+const TORQUE: &str = "tau";
 
-impl Channel {
-    fn quantity(self) -> Quantity {
-        match self {
-            Self::Position => Quantity::Position,
-            Self::Velocity => Quantity::Velocity,
-            Self::Torque => Quantity::Torque,
-            Self::DesiredTorque => Quantity::DesiredTorque,
-        }
-    }
-}
-
-pub const CHANNELS: [Channel; 4] = [Channel::Position, Channel::Velocity, Channel::Torque, Channel::DesiredTorque];
-
-/// Least sigma of each channel: below it a real sensor is not that good, and the twin's own arithmetic is not either.
-const LEAST_SIGMA: [f64; 4] = [5e-7, 5e-5, 1e-2, 5e-3];
 /// Logs with fewer rows in 20 ms than the start state is taken from have rows further apart than this [s]...
 const COARSE_STEP: f64 = 2e-3;
 /// ...and clips shorter than this still remember an error in it at their end [s].
@@ -78,13 +60,14 @@ const START_VELOCITY: f64 = 0.1;
 /// The others feel a joint move when the error is less than this share of what it is with the joint at rest.
 const FELT: f64 = 0.9;
 
-/// What one row of residuals is about.
+/// How measured rows become residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Row {
-    /// Middle of the averaged stamps [ns].
-    pub stamp_ns: u64,
-    pub channel: Channel,
-    pub joint: usize,
+enum Sampling {
+    /// Positions, what every robot logs and a controller is judged by: means over 5 ms (single rows of slower logs) of clips as they were
+    /// recorded, by time, then joint. Each clip has a start state and encoders of its own.
+    Means,
+    /// All that is logged: some hundred rows of clips that were admitted before, by channel, then time.
+    Moments,
 }
 
 /// Clips with an arm, and what numbers mean for the cell.
@@ -94,15 +77,16 @@ pub struct ArmClips<F> {
     mover: Mover,
     /// The twin's own, where another program is the mover: it gives the slopes.
     twin: Option<Mover>,
+    sampling: Sampling,
     channels: Vec<Channel>,
+    /// One sigma of a single value of each channel.
+    sigma: Vec<f64>,
     clips: Vec<ArmClip>,
-    /// One sigma of a single logged value, by [`CHANNELS`].
-    sigma: [Joints; 4],
-    /// Rows by which logged torques are ahead of the twin's.
-    torque_lead: usize,
+    /// What the residuals of each clip are about.
+    rows: Vec<Vec<Row>>,
+    /// Where a search of each has just been, and from where the twin's steps were taken.
+    recent: Vec<[Recent<Vec<f64>, Vec<f64>>; 2]>,
     theta: F,
-    /// Memory for predictions that no evaluation holds right now.
-    spare: Mutex<Vec<Vec<Reading>>>,
 }
 
 /// A clip that was left out, and why.
@@ -113,46 +97,92 @@ pub struct LeftOut {
     pub why: ArmClipError,
 }
 
+/// Who simulates a clip, and in how many parts the twin integrates a control period.
+#[derive(Clone, Copy)]
+struct By<'a> {
+    mover: &'a Mover,
+    parts: u32,
+}
+
+/// Whether the arm of a cell goes along what was measured, whatever its controller was.
+pub fn is_tracking(cell: &Cell) -> bool {
+    cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Tracking)
+}
+
 impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
-    /// Clips of a cell in their order, and those that cannot be used. `theta` gives the parameters that go with shared
-    /// numbers. Of `channels` those count that are logged in every clip.
+    /// Means over recorded clips of a cell in their order, and those that cannot be used. `theta` gives the parameters that go with
+    /// shared numbers.
     ///
     /// # Errors
     /// [`ModelError`] when the cell has no arm that can be simulated.
-    pub fn new(
-        cell: &Cell,
-        clips: Vec<Clip>,
-        channels: &[Channel],
-        theta: F,
-    ) -> Result<(Self, Vec<LeftOut>), ModelError> {
+    pub fn means(cell: &Cell, clips: Vec<Clip>, theta: F) -> Result<(Self, Vec<LeftOut>), ModelError> {
         let nominal = ArmModel::from_cell(cell)?;
         let (mut usable, mut left_out) = (Vec::new(), Vec::new());
         for clip in clips {
-            let file = clip.file.file_name().unwrap_or(clip.file.as_os_str()).to_string_lossy().into_owned();
+            let file = clip::name(&clip);
             match ArmClip::new(clip, cell, &nominal).and_then(ArmClip::long_enough) {
                 Ok(clip) => usable.push(clip),
                 Err(why) => left_out.push(LeftOut { file, why }),
             }
         }
-        let logged = |channel: &Channel| usable.iter().all(|clip| values(clip, *channel).is_some());
-        let mut channels: Vec<Channel> = channels.iter().copied().filter(logged).collect();
-        channels.sort_unstable();
-        channels.dedup();
-        let sigma = sigmas(&usable, nominal.dof());
-        let (torque_lead, spare) = (torque_time::lead(&usable), Mutex::default());
-        let (cell, mover) = (cell.clone(), Mover::own(cell, &nominal));
-        Ok((
-            Self { cell, nominal, mover, twin: None, channels, clips: usable, sigma, torque_lead, theta, spare },
-            left_out,
-        ))
+        Ok((Self::of(cell, nominal, (Sampling::Means, &QUANTITIES[..1]), usable, theta), left_out))
+    }
+
+    /// Moments of clips that were admitted, joints in the model's order.
+    ///
+    /// # Errors
+    /// As [`Self::means`].
+    pub fn moments(cell: &Cell, clips: &[Clip], theta: F) -> Result<Self, ModelError> {
+        let logged = |quantity: &&str| clips.iter().all(|clip| !series(clip, quantity).1.is_empty());
+        let quantities: Vec<&'static str> = if is_tracking(cell) {
+            vec![TORQUE]
+        } else {
+            QUANTITIES.into_iter().filter(|quantity| *quantity == "q" || logged(quantity)).collect()
+        };
+        let asked_for = quantities.contains(&"tau_J_d");
+        let clips = clips.iter().filter_map(|clip| ArmClip::at_moments(clip.clone(), cell, asked_for)).collect();
+        Ok(Self::of(cell, ArmModel::from_cell(cell)?, (Sampling::Moments, &quantities), clips, theta))
+    }
+
+    fn of(
+        cell: &Cell,
+        nominal: ArmModel,
+        (sampling, quantities): (Sampling, &[&'static str]),
+        clips: Vec<ArmClip>,
+        theta: F,
+    ) -> Self {
+        let joints = |quantity: &&'static str| {
+            let quantity = *quantity;
+            (0..nominal.dof()).map(move |joint| {
+                let place = format!("joint{}", joint + 1);
+                Channel { quantity, place, joint: Some(joint), group: Group::Arm }
+            })
+        };
+        let channels: Vec<Channel> = quantities.iter().flat_map(joints).collect();
+        let sigma = channels.iter().map(|channel| sensor_sigma(&clips, channel)).collect();
+        let regimes = Regimes::of(clips.iter().map(|clip| &clip.recorded.desired), nominal.dof());
+        let rows = clips.iter().map(|clip| rows(clip, (sampling, &channels), &regimes)).collect();
+        let recent = clips.iter().map(|_| Default::default()).collect();
+        let mover = Mover::own(cell, &nominal);
+        Self { cell: cell.clone(), nominal, mover, twin: None, sampling, channels, sigma, clips, rows, recent, theta }
     }
 
     /// The same moved by another program, where there is one; `known`: the cell's nominal parameters.
     pub fn moved_by(mut self, engine: Option<Arc<Engine>>, known: &Theta) -> Self {
         self.twin = engine.is_some().then(|| self.mover.clone());
-        let wanted = self.channels.iter().map(|channel| channel.quantity()).collect();
+        let wanted = self.channels.iter().map(|channel| Quantity::named(channel.quantity)).collect();
         self.mover = self.mover.by(engine, known.clone(), wanted);
         self
+    }
+
+    /// Whether another program is the mover.
+    pub fn is_moved_by_engine(&self) -> bool {
+        self.twin.is_some()
+    }
+
+    /// Whether torques along the measured motion are all that is looked at.
+    pub fn is_of_torques(&self) -> bool {
+        self.channels.iter().all(|channel| channel.quantity == TORQUE)
     }
 
     /// Lets dead joints follow their commands unseen in the clips in which the others feel them move: then it is a reading
@@ -162,6 +192,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
             let Some(unseen) = self.clips[clip].unseen() else { continue };
             let still = self.cost(clip, shared);
             let held = std::mem::replace(&mut self.clips[clip], unseen);
+            self.recent[clip] = Default::default();
             if self.cost(clip, shared) >= FELT * still {
                 self.clips[clip] = held;
             }
@@ -170,29 +201,26 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 
     /// Sum of squared residuals; infinite where the twin cannot be simulated.
     fn cost(&self, clip: usize, shared: &[f64]) -> f64 {
-        let mut out = Vec::new();
-        let told = self.residuals(clip, shared, &[], &mut out);
-        told.map_or(f64::INFINITY, |()| out.iter().map(|residual| residual * residual).sum())
+        let residuals = self.residuals_in(1, (clip, shared, &[]));
+        residuals.map_or(f64::INFINITY, |residuals| residuals.iter().map(|residual| residual * residual).sum())
     }
 
-    /// What is a clip's own: where the log is too coarse to tell the state in which it begins, that state (positions, then
-    /// velocities, of all joints; otherwise their sigmas are 0), and how old its encoders' readings are.
+    /// What is a clip's own where means are taken: where the log is too coarse to tell the state in which it begins, that state
+    /// (positions, then velocities, of all joints; otherwise their sigmas are 0), and how old its encoders' readings are.
     pub fn random(&self) -> Vec<Random> {
         let coarse = self.clips.iter().any(|clip| {
             let rows = &clip.recorded.measured;
             let step = rows.duration() / (rows.len() - 1) as f64;
             step > COARSE_STEP && rows.duration() < SHORT_CLIP
         });
-        let of = |what: &str, sigma: [f64; MAX_JOINTS], step: f64| -> Vec<Random> {
-            let one = |joint: usize| Random {
-                name: format!("start {what}[{joint}]"),
-                sigma: if coarse { sigma[joint] } else { 0.0 },
-                step,
-            };
-            (0..self.nominal.dof()).map(one).collect()
+        let of = |what: &str, joint: usize, sigma: f64, step: f64| Random {
+            name: format!("start {what}[{joint}]"),
+            sigma: if coarse { sigma } else { 0.0 },
+            step,
         };
-        let mut all = of("q", self.sigma[0], 1e-4);
-        all.extend(of("dq", [START_VELOCITY; MAX_JOINTS], 1e-2));
+        let mut all: Vec<Random> =
+            self.sigma.iter().enumerate().map(|(joint, sigma)| of("q", joint, *sigma, 1e-4)).collect();
+        all.extend((0..self.nominal.dof()).map(|joint| of("dq", joint, START_VELOCITY, 1e-2)));
         all.push(encoder_age::random());
         all
     }
@@ -202,61 +230,64 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         &self.nominal
     }
 
-    /// The channels in use.
+    /// What is looked at.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
     }
 
-    /// One sigma of a single logged value.
-    pub fn sigma(&self, channel: Channel, joint: usize) -> f64 {
-        self.sigma[channel as usize][joint]
+    /// One sigma of a single value of each channel, in its unit.
+    pub fn sigma(&self) -> &[f64] {
+        &self.sigma
     }
 
-    /// A recorded clip, joints in the model's order.
-    pub fn clip(&self, clip: usize) -> &Clip {
-        &self.clips[clip].recorded
-    }
-
-    /// Name of its file.
-    pub fn name(&self, clip: usize) -> String {
-        self.clips[clip].name()
-    }
-
-    /// What a reader of its figures has to know, one sentence each.
-    pub fn warnings(&self, clip: usize) -> &[String] {
-        &self.clips[clip].warnings
-    }
-
-    /// Whether a joint follows no command in this clip; its rows are 0.
-    pub fn is_dead(&self, clip: usize, joint: usize) -> bool {
-        self.clips[clip].dead[joint]
-    }
-
-    /// Whether a dead joint is taken to stand where it is, rather than to follow its commands unseen.
-    pub fn stands_still(&self, clip: usize, joint: usize) -> bool {
-        self.clips[clip].stands_still(joint)
-    }
-
-    /// Measured rows that count, in the groups that are averaged.
-    pub fn averaged(&self, clip: usize) -> &[Range<usize>] {
-        &self.clips[clip].bins
+    /// A clip as it was prepared.
+    pub fn clip(&self, clip: usize) -> &ArmClip {
+        &self.clips[clip]
     }
 
     /// What each row of a clip's residuals is about.
-    pub fn rows(&self, clip: usize) -> impl Iterator<Item = Row> + '_ {
-        let (clip, dof) = (&self.clips[clip], self.nominal.dof());
-        let stamps = &clip.recorded.measured.stamps_ns;
-        clip.bins.iter().flat_map(move |bin| {
-            let stamp_ns = stamps[bin.start] + (stamps[bin.end - 1] - stamps[bin.start]) / 2;
-            let channels = self.channels.iter();
-            channels.flat_map(move |channel| (0..dof).map(move |joint| Row { stamp_ns, channel: *channel, joint }))
-        })
+    pub fn rows(&self, clip: usize) -> &[Row] {
+        &self.rows[clip]
+    }
+
+    /// By how much a vertical force of 1 N at the tip turns each joint at measured joints [N m].
+    pub fn vertical_lever(&self, measured: &[f64]) -> Joints {
+        let mut q = [0.0; MAX_JOINTS];
+        q[..measured.len()].copy_from_slice(measured);
+        let tip = self.nominal.tip(&q).position();
+        self.nominal.jacobian(&q, tip).map(|column| column[2])
+    }
+
+    /// Moments of a clip along its measured motion, where the arm's law is a spring to the command and a damper to the ground; none
+    /// elsewhere.
+    pub fn following(&self, clip: usize) -> Vec<Moment> {
+        let Some(controller) = &self.cell.controller else { return Vec::new() };
+        let clip = &self.clips[clip];
+        let stamps: Vec<u64> = clip.rows.iter().map(|row| clip.recorded.measured.stamps_ns[*row]).collect();
+        let logged = (&clip.recorded.measured, &clip.commands);
+        following::moments((&self.nominal, controller.kind), logged, &stamps).unwrap_or_default()
+    }
+
+    /// Largest torque that the controller asks of each joint in any of the clips, gravity included [N m].
+    ///
+    /// # Errors
+    /// [`Impossible`] when the cell cannot be simulated with these numbers.
+    pub fn peaks(&self, shared: &[f64]) -> Result<Joints, Impossible> {
+        let mut peaks = [0.0; MAX_JOINTS];
+        for clip in 0..self.clips.len() {
+            for reading in self.readings(self.by(1), (clip, shared, &[]))? {
+                let gravity = self.nominal.gravity(&reading.state.q);
+                let asked = reading.tau_J_d.iter().zip(gravity).map(|(tau, gravity)| (tau + gravity).abs());
+                peaks.iter_mut().zip(asked).for_each(|(peak, asked)| *peak = asked.max(*peak));
+            }
+        }
+        Ok(peaks)
     }
 
     /// What the sensors would have read at every measured row; rows that are not simulated are left at zero.
     ///
     /// # Errors
-    /// [`Impossible`] when the cell cannot be simulated with these numbers.
+    /// As [`Self::peaks`].
     pub fn predict(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<Reading>, Impossible> {
         self.predict_in(1, (clip, shared, own))
     }
@@ -264,99 +295,32 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// The same with every control period integrated in `parts`.
     ///
     /// # Errors
-    /// As [`ArmClips::predict`].
+    /// As [`Self::peaks`].
     pub fn predict_in(&self, parts: u32, of: (usize, &[f64], &[f64])) -> Result<Vec<Reading>, Impossible> {
-        let ((clip, shared, own), mut out) = (of, Vec::new());
-        self.simulate(&self.mover, &self.clips[clip], (shared, own, parts), &mut out)?;
-        Ok(out)
+        let (clip, asked) = (&self.clips[of.0], self.asked());
+        let mut all = vec![Reading::default(); clip.recorded.measured.len()];
+        for (row, reading) in clip.rows.iter().zip(self.readings(self.by(parts), of)?.into_iter().step_by(asked)) {
+            all[*row] = reading;
+        }
+        Ok(all)
     }
 
-    /// [`ClipModel::residuals`] with every control period integrated in `parts`; 1 is how the twin does it.
+    /// [`ClipModel::residuals`] as a simulation gives them, known or not, with every control period integrated in `parts`; 1 is how the
+    /// twin does it.
     ///
     /// # Errors
-    /// [`Impossible`] as there.
-    pub fn residuals_in(
-        &self,
-        parts: u32,
-        (clip, shared, own): (usize, &[f64], &[f64]),
-        out: &mut Vec<f64>,
-    ) -> Result<(), Impossible> {
-        self.residuals_by(&self.mover, (clip, shared, own), parts, out)
+    /// As [`Self::peaks`].
+    pub fn residuals_in(&self, parts: u32, of: (usize, &[f64], &[f64])) -> Result<Vec<f64>, Impossible> {
+        self.residuals_by(self.by(parts), of)
     }
 
-    fn residuals_by(
-        &self,
-        mover: &Mover,
-        (clip, shared, own): (usize, &[f64], &[f64]),
-        parts: u32,
-        out: &mut Vec<f64>,
-    ) -> Result<(), Impossible> {
-        let mut predicted = self.spare.lock().expect("no evaluation panics").pop().unwrap_or_default();
-        let clip = &self.clips[clip];
-        let answer = self.simulate(mover, clip, (shared, own, parts), &mut predicted);
-        if answer.is_ok() {
-            out.clear();
-            for bin in &clip.bins {
-                for channel in &self.channels {
-                    self.differences(clip, *channel, bin, &predicted, out);
-                }
-            }
-        }
-        self.spare.lock().expect("no evaluation panics").push(predicted);
-        answer
+    fn by(&self, parts: u32) -> By<'_> {
+        By { mover: &self.mover, parts }
     }
 
-    fn simulate(
-        &self,
-        mover: &Mover,
-        clip: &ArmClip,
-        (shared, own, parts): (&[f64], &[f64], u32),
-        out: &mut Vec<Reading>,
-    ) -> Result<(), Impossible> {
-        let theta = &(self.theta)(shared);
-        let dof = self.nominal.dof();
-        let age = encoder_age::of(own.get(2 * dof));
-        let seen = encoder_age::controlled(&self.cell, &clip.recorded.desired, theta, age);
-        let (theta, commands) = seen.as_ref().map_or((theta, &clip.commands), |(theta, commands)| (theta, commands));
-        let measured = &clip.recorded.measured;
-        out.clear();
-        out.resize(measured.len(), Reading::default());
-        for (i, run) in clip.runs.iter().enumerate() {
-            let ahead = if i == 0 { &own[..own.len().min(2 * dof)] } else { &[] };
-            let stretch = Stretch { measured, from: run.start, commands, ahead, parts };
-            mover.readings(theta, &stretch, &measured.stamps_ns[run.clone()], &mut out[run.clone()])?;
-        }
-        encoder_age::shift(age, out);
-        Ok(())
+    fn residuals_by(&self, by: By<'_>, of: (usize, &[f64], &[f64])) -> Result<Vec<f64>, Impossible> {
+        self.compared(&self.clips[of.0], &self.readings(by, of)?)
     }
-}
-
-/// The logged values of a channel, row-major, and the row at each measured row.
-fn values(clip: &ArmClip, channel: Channel) -> Option<&[f64]> {
-    let Clip { measured, desired, .. } = &clip.recorded;
-    let values = match channel {
-        Channel::Position => &measured.q,
-        Channel::Velocity => &measured.dq,
-        Channel::Torque => &measured.tau,
-        Channel::DesiredTorque => &desired.tau,
-    };
-    (!values.is_empty()).then_some(values)
-}
-
-/// Joint by joint.
-fn sigmas(clips: &[ArmClip], dof: usize) -> [Joints; 4] {
-    CHANNELS.map(|channel| {
-        let least = LEAST_SIGMA[channel as usize];
-        let mut sigma = [least; MAX_JOINTS];
-        for (joint, sigma) in sigma.iter_mut().enumerate().take(dof) {
-            let of = |clip: &ArmClip| {
-                let signal: Vec<f64> = values(clip, channel)?.iter().skip(joint).step_by(dof).copied().collect();
-                (!clip.dead[joint]).then(|| noise::sigma(&signal))
-            };
-            *sigma = noise::of_clips(clips.iter().filter_map(of)).max(least);
-        }
-        sigma
-    })
 }
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
@@ -365,7 +329,12 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        self.residuals_in(1, (clip, shared, own), out)
+        let simulated = || self.residuals_in(1, (clip, shared, own));
+        match self.sampling {
+            Sampling::Means => *out = simulated()?,
+            Sampling::Moments => out.clone_from(&*self.recent[clip][0].at(shared.to_vec(), simulated)?),
+        }
+        Ok(())
     }
 
     fn stepped(
@@ -376,53 +345,23 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
         let Some(twin) = &self.twin else { return self.residuals(clip, shared, own, out) };
-        let mut before = Vec::new();
-        self.residuals_by(twin, (clip, from, from_own), 1, &mut before)?;
-        self.residuals_by(twin, (clip, shared, own), 1, out)?;
-        out.iter_mut().zip(base).zip(&before).for_each(|((out, base), before)| *out += base - before);
+        let by = By { mover: twin, parts: 1 };
+        let from_there = || self.residuals_by(by, (clip, from, from_own));
+        let before = self.recent[clip][1].at([from, from_own].concat(), from_there)?;
+        *out = self.residuals_by(by, (clip, shared, own))?;
+        out.iter_mut().zip(base).zip(&*before).for_each(|((out, base), before)| *out += base - before);
         Ok(())
     }
 
     fn stretches(&self, clip: usize) -> Vec<usize> {
-        let (clip, rows) = (&self.clips[clip], self.channels.len() * self.nominal.dof());
-        (1..=clip.bins.len().div_ceil(clip.stretch)).map(|i| (i * clip.stretch).min(clip.bins.len()) * rows).collect()
+        let ArmClip { bins, stretch, .. } = &self.clips[clip];
+        let ends = bins.chunks((*stretch).max(1)).scan(0, |rows, bins| {
+            *rows += bins.len() * self.channels.len();
+            Some(*rows)
+        });
+        if *stretch == 0 { Vec::new() } else { ends.collect() }
     }
 }
 
-impl<F> ArmClips<F> {
-    /// Mean of measured less predicted over a bin, for each joint, in sigmas of that mean.
-    fn differences(
-        &self,
-        clip: &ArmClip,
-        channel: Channel,
-        bin: &Range<usize>,
-        predicted: &[Reading],
-        out: &mut Vec<f64>,
-    ) {
-        let dof = self.nominal.dof();
-        let Some(logged) = values(clip, channel) else { return out.extend(std::iter::repeat_n(0.0, dof)) };
-        let mut sum = [0.0; MAX_JOINTS];
-        let mut count = 0.0;
-        for row in bin.clone() {
-            let at = if channel == Channel::DesiredTorque { clip.desired_rows[row] } else { Some(row) };
-            let Some(logged) = at.and_then(|at| logged.get(at * dof..(at + 1) * dof)) else { continue };
-            // The last row of a run has no successor, and its torque is as good as the one before.
-            let led = (row + self.torque_lead).min(clip.last_row(row));
-            let predicted = match channel {
-                Channel::Position => &predicted[row].state.q,
-                Channel::Velocity => &predicted[row].state.dq,
-                Channel::Torque => &predicted[led].tau_J,
-                Channel::DesiredTorque => &predicted[led].tau_J_d,
-            };
-            count += 1.0;
-            for ((sum, logged), predicted) in sum.iter_mut().zip(logged).zip(predicted) {
-                *sum += logged - predicted;
-            }
-        }
-        // What is asked for has no noise that averages out: its sigma is the twin's own.
-        let gain: f64 = if channel == Channel::DesiredTorque { 1.0 } else { f64::sqrt(count) };
-        let sigma = &self.sigma[channel as usize];
-        let weight = |joint: usize| if clip.dead[joint] || count == 0.0 { 0.0 } else { gain / (count * sigma[joint]) };
-        out.extend((0..dof).map(|joint| sum[joint] * weight(joint)));
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -1,9 +1,27 @@
-//! How noisy a logged signal is, from the signal itself.
+//! How noisy a logged signal is, from the signal itself, how quiet a sensor can be at best, and how many of neighbouring residuals say
+//! the same.
 
 /// Third differences of white noise of one sigma have this variance: 1 + 9 + 9 + 1.
 const THIRD_DIFFERENCE: f64 = 20.0;
 /// Median of the absolute value of a normal variable, in sigmas.
 const MEDIAN_ABSOLUTE: f64 = 0.674_49;
+
+/// Least sigma of a logged position [rad]: the quantisation of an encoder of 21 bits a turn, `2 pi / 2^21 / sqrt(12)`, rounded up.
+const POSITION_FLOOR: f64 = 1e-6;
+/// Least sigma of a logged velocity [rad/s]: controllers take it from the same encoders. Of the FR3 it is 50 times that of its positions
+/// (`config/fr3_cell.toml`), which is a filtered difference: plain ones over 1 ms have 1400 times.
+const VELOCITY_FLOOR: f64 = 1e-6;
+/// Least sigma of a torque [N m]: an FR3's controller (50 to 600 N m/rad, 15 to 50 N m s/rad) makes 0.8 to 3 mN m of its encoders' floors.
+const TORQUE_FLOOR: f64 = 1e-3;
+
+/// Least sigma of what is logged of a joint, in its unit: a log that looks quieter was computed, or stood on one step of its encoder.
+pub fn floor(quantity: &str) -> f64 {
+    match quantity {
+        "q" => POSITION_FLOOR,
+        "dq" => VELOCITY_FLOOR,
+        _ => TORQUE_FLOOR,
+    }
+}
 
 /// One sigma of the noise of an evenly sampled signal. Third differences take out the motion; their median takes out
 /// events. Never less than what its resolution leaves unknown: slow motion on a coarse encoder stands on one step for most

@@ -3,12 +3,13 @@
 //!
 //! A clip's rows are its poses: position along x, y, z and rotation vector about them, measured less predicted, each in
 //! sigmas of the tracker's noise, base frame; and, where asked for, the joints from the hit on: the blow that the arm
-//! takes says how heavy the object is. Every clip has numbers of its own ([`Own`]): the hit above all differs a little
+//! takes says how heavy the object is. Every clip has nuisance parameters ([`Nuisance`]): the hit above all differs a little
 //! from any simulated one, and read as structure that little would be taken for an effect that is not there.
 //!
 //! | file | owns |
 //! |---|---|
-//! | `own` | the numbers of a clip's own |
+//! | `nuisance` | the parameters of a clip's own |
+//! | `deviations` | how its path deviates from any simulated one |
 //! | `clip` | a recorded clip, prepared |
 //! | `clearance` | how far tool and object are apart |
 //! | `rollout` | a clip in the twin |
@@ -21,31 +22,34 @@
 mod cache;
 mod clearance;
 mod clip;
+mod deviations;
+mod nuisance;
 mod outcome;
-mod own;
 mod replayed;
 mod rollout;
 mod rows;
 mod simulator;
 
 pub use clearance::{Clearance, alone_until};
-pub use own::{ALL, Axis, Own, Values};
+pub use nuisance::{IDENTIFIED, Nuisance, diagnosed, random_effects};
 pub use replayed::Replays;
 pub use rows::{Channel, Part, Row};
 
 use super::Settings;
+use super::random_effects::RandomEffects;
 use crate::engine::Engine;
-use crate::estimate::{ClipModel, Impossible, Random};
+use crate::estimate::{ClipModel, Impossible};
 use cache::ClipCache;
 use clip::ObjectClip;
 use nalgebra::Isometry3;
+use nuisance::Values;
 use outcome::Outcome;
 use rollout::Job;
 use shared_mem::cell::{Cell, ClipKind, PoseNoise};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
-use simulator::{Simulator, composed, is_whole};
+use simulator::{Simulator, composed};
 use std::sync::{Arc, Mutex};
 use twin::effects::CameraMemory;
 use twin::rollout::CellRollout;
@@ -64,8 +68,8 @@ pub fn noise_of(cell: &Cell) -> PoseNoise {
 pub struct ModelError {
     /// Of poses between the first touch and the moment the tool lets go [m, rad].
     pub hit: PoseNoise,
-    /// Of poses from then on [m, rad]: one error of the whole rest, however many poses show it. Zero where own numbers
-    /// take what the hit leaves behind.
+    /// Of poses from then on [m, rad]: one error of the whole rest, however many poses show it. Zero where nuisance
+    /// parameters take what the hit leaves behind.
     pub rest: PoseNoise,
     /// Of the joints from the hit on [rad]; `None` leaves the arm out.
     pub joints: Option<f64>,
@@ -88,6 +92,8 @@ pub struct ObjectClips {
     noise: PoseNoise,
     error: ModelError,
     clips: Vec<ObjectClip>,
+    /// What each clip has of its own, in the order of its numbers.
+    nuisance: Vec<Nuisance>,
     caches: Vec<ClipCache>,
     /// The other program where there is one, and what came of it, clip by clip.
     simulator: Option<Simulator>,
@@ -115,12 +121,14 @@ impl ObjectClips {
     pub fn new(cell: &Cell, clips: Vec<Clip>, settings: Settings) -> Result<Self, SimError> {
         let noise = noise_of(cell);
         let prepared = |clip| ObjectClip::new(clip, cell, noise.position);
-        let clips: Vec<_> = clips.into_iter().filter_map(prepared).collect();
+        let clips: Vec<ObjectClip> = clips.into_iter().filter_map(prepared).collect();
+        let acts = |own: &Nuisance| clips.iter().any(|clip| own.acts_in(clip.recorded.kind));
+        let nuisance = IDENTIFIED.iter().copied().filter(acts).collect();
         let [caches, simulated] = [(), ()].map(|()| clips.iter().map(|_| ClipCache::default()).collect());
         let worker = CellRollout::new(cell, None)?;
         let (error, workers) = (ModelError::default(), Mutex::default());
         let (cell, simulator) = (cell.clone(), None);
-        Ok(Self { cell, noise, error, clips, caches, simulator, simulated, workers, worker, settings })
+        Ok(Self { cell, noise, error, clips, nuisance, caches, simulator, simulated, workers, worker, settings })
     }
 
     /// The same simulated by another program, where there is one; `nominal`: the cell's nominal parameters.
@@ -152,15 +160,23 @@ impl ObjectClips {
         self.error = error;
     }
 
-    /// What varies from clip to clip, in the order of [`ALL`], with the scatter that is assumed until it is estimated;
-    /// 0 where it means nothing in any of these clips.
-    pub fn random(&self) -> Vec<Random> {
-        let kinds = || self.clips.iter().map(|clip| clip.recorded.kind);
-        let sigma = |own: Own| {
-            let acting = kinds().filter(|kind| own.acts_in(*kind));
-            acting.map(|kind| own.sigma(&self.cell, kind)).fold(0.0, f64::max)
-        };
-        ALL.map(|own| Random { sigma: sigma(own), ..own.random() }).to_vec()
+    /// The same with other parameters of each clip's own than [`IDENTIFIED`].
+    pub fn with_nuisance(self, nuisance: Vec<Nuisance>) -> Self {
+        Self { nuisance, ..self }
+    }
+
+    /// What each clip has of its own, with the scatter that is assumed until it is estimated.
+    pub fn random(&self) -> RandomEffects {
+        random_effects(&self.nuisance, &self.cell)
+    }
+
+    /// What one unit of every deviation of the path among these takes off the residuals of a clip's poses [1/m, 1/rad].
+    pub fn path_slopes(&self, clip: usize) -> Vec<Vec<f64>> {
+        deviations::slopes(self, clip, self.nuisance.iter().filter_map(|own| own.deviation()))
+    }
+
+    fn values(&self, clip: usize, own: &[f64]) -> Values {
+        Values::new(&self.nuisance, own, self.clips[clip].recorded.kind)
     }
 
     /// What the twin makes of a clip.
@@ -168,7 +184,7 @@ impl ObjectClips {
     /// # Errors
     /// [`Impossible`] when the cell cannot be simulated with these numbers.
     pub fn predict(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Prediction, Impossible> {
-        let own = Values::new(own, self.clips[clip].recorded.kind);
+        let own = self.values(clip, own);
         let outcome = self.outcome(clip, shared, &own)?;
         Ok(Prediction { poses: reported(&outcome, &self.clips[clip], &own), contact_ns: outcome.contact_ns })
     }
@@ -191,26 +207,22 @@ impl ObjectClips {
     fn outcome(&self, clip: usize, shared: &[f64], own: &Values) -> Result<Arc<Outcome>, Impossible> {
         let theta = self.settings.theta(shared);
         let Some(simulator) = &self.simulator else { return self.by_twin(clip, &theta, own) };
-        let cache = &self.simulated[clip];
-        if let Some(outcome) = cache.outcome(&theta, own) {
-            return Ok(outcome);
-        }
-        let (known, standing) = (simulator.part(&theta), own.standing());
-        let mut outcome = self.job(clip, (&known, &standing), |mut job| simulator.outcome(&mut job))?;
-        if !is_whole((&theta, &known), own) {
-            let [with, without] = [self.by_twin(clip, &theta, own)?, self.by_twin(clip, &known, &standing)?];
-            outcome = composed(&outcome, &with, &without);
-        }
-        Ok(cache.keep_outcome(theta, own, outcome))
+        let outcome = || {
+            let (known, nothing) = (simulator.part(&theta), Values::default());
+            let theirs = self.job(clip, (&known, &nothing), |mut job| simulator.outcome(&mut job))?;
+            // What the twin does not change of what the engine makes of a clip.
+            if theta == known && own.felt() == nothing {
+                return Ok(theirs);
+            }
+            let [with, without] = [self.by_twin(clip, &theta, own)?, self.by_twin(clip, &known, &nothing)?];
+            Ok(composed(&theirs, &with, &without))
+        };
+        self.simulated[clip].outcomes.at((theta.clone(), own.felt()), outcome)
     }
 
     fn by_twin(&self, clip: usize, theta: &Theta, own: &Values) -> Result<Arc<Outcome>, Impossible> {
-        let cache = &self.caches[clip];
-        if let Some(outcome) = cache.outcome(theta, own) {
-            return Ok(outcome);
-        }
-        let outcome = self.job(clip, (theta, own), |job| job.run())?;
-        Ok(cache.keep_outcome(theta.clone(), own, outcome))
+        let simulated = || self.job(clip, (theta, own), |job| job.run());
+        self.caches[clip].outcomes.at((theta.clone(), own.felt()), simulated)
     }
 
     /// Has something done by an idle worker.
@@ -234,7 +246,7 @@ impl ObjectClips {
     /// # Errors
     /// [`Impossible`] when the cell cannot be simulated with these numbers.
     pub fn errors(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
-        let own = Values::new(own, self.clips[clip].recorded.kind);
+        let own = self.values(clip, own);
         self.errors_of(clip, &*self.outcome(clip, shared, &own)?, &own)
     }
 
@@ -243,7 +255,7 @@ impl ObjectClips {
     /// # Errors
     /// As [`Self::errors`].
     pub fn twins_errors(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
-        let own = Values::new(own, self.clips[clip].recorded.kind);
+        let own = self.values(clip, own);
         self.errors_of(clip, &*self.by_twin(clip, &self.settings.theta(shared), &own)?, &own)
     }
 
@@ -288,7 +300,7 @@ impl ObjectClips {
 }
 
 fn reported(outcome: &Outcome, clip: &ObjectClip, own: &Values) -> Vec<Pose<Base, Object>> {
-    let late = outcome.camera.latency_ns() as f64 + own.of(Own::Clock) * 1e9;
+    let late = outcome.camera.latency_ns() as f64 + own.clock * 1e9;
     let mut memory = CameraMemory::default();
     let stamps = clip.recorded.object.stamps_ns.iter();
     let seen = |stamp: &u64| {

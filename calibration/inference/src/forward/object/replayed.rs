@@ -1,7 +1,7 @@
 //! The figures of `twin replay` for strokes, whoever simulates them.
 
+use super::nuisance::Values;
 use super::outcome::Outcome;
-use super::own::Values;
 use super::{ObjectClips, reported};
 use crate::engine::Engine;
 use crate::forward::Settings;

@@ -1,13 +1,13 @@
 //! One clip in the twin: the arm comes, hits, the object slides until it rests. Base frame, SI, stamps of the recording.
 //!
 //! A run has three parts, and the first two are kept: until the first touch nothing but the arm and the place of the
-//! object counts; until the tool lets go the clip's own numbers do not. So what differs by friction from clip to clip
+//! object counts; until the tool lets go the clip's nuisance parameters do not. So what differs by friction from clip to clip
 //! costs the last part alone.
 
 use super::cache::{Approach, ArmKey, ClipCache, Hit};
 use super::clip::ObjectClip;
+use super::nuisance::Values;
 use super::outcome::{Outcome, Path};
-use super::own::{Own, Values};
 use crate::estimate::Impossible;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, ClipKind};
@@ -62,7 +62,7 @@ impl Job<'_> {
     pub(super) fn standing(&self, object: &ObjectModel) -> Result<Isometry3<f64>, Impossible> {
         let series = self.clip.undistorted(&self.worker.cell().camera_effects());
         let rest = object_start::resting(&series, object, self.cell).ok_or_else(|| impossible("no object poses"))?;
-        Ok(self.moved(&rest.isometry()))
+        Ok(rest.isometry())
     }
 
     /// What was commanded, and the state in which the arm begins under the worker's parameters.
@@ -81,7 +81,6 @@ impl Job<'_> {
         if let Some(checkpoint) = &hit.checkpoint {
             self.with_own_friction(object)?;
             self.worker.resume(checkpoint);
-            self.leave_behind();
             let (clip, mut rested) = (self.clip, 0);
             while self.worker.now_ns() < clip.end_ns && !(rested > REST_PERIODS && self.worker.now_ns() > clip.rest_ns)
             {
@@ -97,32 +96,27 @@ impl Job<'_> {
 
     /// From the start, or from what is kept, to the moment at which the tool has let go.
     fn until_release(&mut self, start: Isometry3<f64>) -> Result<Arc<Hit>, Impossible> {
-        if let Some(hit) = self.cache.hit(self.theta, &start) {
-            return Ok(hit);
-        }
-        let key = ArmKey::new(self.theta, start);
-        let approach = match self.cache.approach(&key) {
-            Some(approach) => approach,
-            None => self.cache.keep_approach(self.approach(key, &start)?),
-        };
-        let mut joints = approach.joints.clone();
-        let mut path = Path { start_ns: approach.contact_ns.unwrap_or(0), poses: vec![start] };
-        let mut checkpoint = None;
-        if let Some(from) = &approach.checkpoint {
-            self.worker.resume(from);
-            while self.worker.now_ns() < self.clip.free_ns {
-                not_interrupted()?;
-                self.tick(&mut joints);
-                self.keep(&mut path)?;
+        let cache = self.cache;
+        cache.hits.at((self.theta.clone(), start), || {
+            let key = ArmKey::new(self.theta, start);
+            let approach = cache.approaches.at(key.clone(), || self.approach(&key, &start))?;
+            let mut joints = approach.joints.clone();
+            let mut path = Path { start_ns: approach.contact_ns.unwrap_or(0), poses: vec![start] };
+            let mut checkpoint = None;
+            if let Some(from) = &approach.checkpoint {
+                self.worker.resume(from);
+                while self.worker.now_ns() < self.clip.free_ns {
+                    not_interrupted()?;
+                    self.tick(&mut joints);
+                    self.keep(&mut path)?;
+                }
+                checkpoint = Some(self.worker.checkpoint());
             }
-            checkpoint = Some(self.worker.checkpoint());
-        }
-        let contact_ns = approach.contact_ns;
-        let hit = Hit { theta: self.theta.clone(), start, path, joints, checkpoint, contact_ns };
-        Ok(self.cache.keep_hit(hit))
+            Ok(Hit { path, joints, checkpoint, contact_ns: approach.contact_ns })
+        })
     }
 
-    fn approach(&mut self, key: ArmKey, start: &Isometry3<f64>) -> Result<Approach, Impossible> {
+    fn approach(&mut self, key: &ArmKey, start: &Isometry3<f64>) -> Result<Approach, Impossible> {
         self.worker.set_parameters(&key.theta()).map_err(impossible)?;
         let (_, first) = self.begun()?;
         let object = ObjectState::at_rest(Pose::from_isometry(*start));
@@ -135,7 +129,7 @@ impl Job<'_> {
         not_interrupted()?;
         let checkpoint = contact_ns.map(|_| self.worker.checkpoint());
         self.worker.set_parameters(self.theta).map_err(impossible)?;
-        Ok(Approach { key, joints, checkpoint, contact_ns })
+        Ok(Approach { joints, checkpoint, contact_ns })
     }
 
     /// An object that somebody let go.
@@ -143,11 +137,13 @@ impl Job<'_> {
         let camera = self.worker.cell().camera_effects();
         let series = self.clip.undistorted(&camera);
         let motion = object_start::moving(&series, object, self.cell).ok_or_else(|| impossible("too few poses"))?;
-        let pose = self.moved(&motion.pose.isometry());
+        let pose = motion.pose.isometry();
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.own.start_yaw);
+        let pose = Isometry3::from_parts((pose.translation.vector + self.own.start).into(), turn * pose.rotation);
         let state = ObjectState {
             pose: Pose::from_isometry(pose),
-            velocity: motion.velocity + self.own.vector(Own::Velocity),
-            angular_velocity: motion.angular_velocity + self.own.vector(Own::Spin),
+            velocity: motion.velocity + self.own.velocity,
+            angular_velocity: motion.angular_velocity + self.own.spin,
         };
         self.with_own_friction(object)?;
         // What is reported first was one latency earlier.
@@ -178,35 +174,10 @@ impl Job<'_> {
         Ok(state.velocity == Vector3::zeros() && state.angular_velocity == Vector3::zeros())
     }
 
-    fn moved(&self, pose: &Isometry3<f64>) -> Isometry3<f64> {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.own.of(Own::StartYaw));
-        let shift = self.own.vector(Own::Start);
-        Isometry3::from_parts((pose.translation.vector + shift).into(), turn * pose.rotation)
-    }
-
     fn with_own_friction(&mut self, object: &ObjectModel) -> Result<(), Impossible> {
-        let factor = self.own.of(Own::LnFriction).exp();
+        let factor = self.own.ln_friction.exp();
         let mut theta = self.theta.clone();
         theta.object.get_or_insert_with(ObjectTheta::default).friction = Some(object.friction * factor);
         self.worker.set_parameters(&theta).map_err(impossible)
-    }
-
-    /// What the real hit left behind besides the simulated one.
-    fn leave_behind(&mut self) {
-        let [shift, velocity] = [self.own.vector(Own::Release), self.own.vector(Own::ReleaseVelocity)];
-        let [yaw, spin] = [Own::ReleaseYaw, Own::ReleaseSpin].map(|own| self.own.of(own));
-        let nothing = Vector3::zeros();
-        let Some(mut state) =
-            self.worker.object().filter(|_| (shift, velocity, yaw, spin) != (nothing, nothing, 0.0, 0.0))
-        else {
-            return;
-        };
-        let pose = state.pose.isometry();
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
-        let pose = Isometry3::from_parts((pose.translation.vector + shift).into(), turn * pose.rotation);
-        state.pose = Pose::from_isometry(pose);
-        state.velocity += velocity;
-        state.angular_velocity += Vector3::z() * spin;
-        self.worker.put_object(&state);
     }
 }

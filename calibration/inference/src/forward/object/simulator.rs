@@ -7,14 +7,13 @@
 //!
 //! Encoders add up as numbers. Of poses the places add up, and turns are put one behind the other: the engine's, then the one from
 //! `twin(known)` to `twin(theta, own)`, each about the base's axes. All three begin with the object where the recorded poses have it
-//! and the arm in one state. Camera effects are applied to the outcome, so that they are exact. Of a clip's own numbers the engine
-//! gets the object's start pose alone.
+//! and the arm in one state. Camera effects are applied to the outcome, so that they are exact. Of a clip's nuisance parameters
+//! the engine gets none.
 //!
 //! The difference is taken at equal times. The twin may touch the object some milliseconds before or after the engine does, and let it go
 //! with another speed: what an effect changes then is right to first order, the less the nearer both hits are to each other.
 
 use super::outcome::{Outcome, Path};
-use super::own::Values;
 use super::rollout::{Job, impossible};
 use crate::engine::{Engine, ObjectBody, ObjectQuestion, POSE, Quantity, Question};
 use crate::estimate::Impossible;
@@ -48,8 +47,7 @@ impl Simulator {
         self.engine.ability().part(theta, &self.nominal)
     }
 
-    /// The clip as the engine alone simulates it, the object's path from the first measured row on. Of the job's parameters it must know all,
-    /// of its own numbers only where the object stands counts.
+    /// The clip as the engine alone simulates it, the object's path from the first measured row on. Of the job's parameters it must know all.
     pub(super) fn outcome(&self, job: &mut Job<'_>) -> Result<Outcome, Impossible> {
         job.worker.set_parameters(job.theta).map_err(impossible)?;
         let model = ObjectModel::new(job.cell, Some(job.theta)).map_err(impossible)?;
@@ -110,11 +108,6 @@ pub(super) fn composed(theirs: &Outcome, with: &Outcome, without: &Outcome) -> O
         contact_ns: theirs.contact_ns,
         camera: with.camera,
     }
-}
-
-/// Whether the twin changes nothing of what the engine makes of a clip's own numbers.
-pub(super) fn is_whole((theta, known): (&Theta, &Theta), own: &Values) -> bool {
-    theta == known && own.felt() == own.standing()
 }
 
 /// The object's numbers, without what effects change of them.

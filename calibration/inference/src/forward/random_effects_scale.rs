@@ -1,35 +1,35 @@
-//! How widely clips scatter under one hypothesis: a number of the hypothesis, not of nature.
+//! How widely clips scatter under one hypothesis: the empirical-Bayes scale of its random effects.
 //!
-//! Clips may deviate as far as those of another engine do from a twin that is given everything ([`Scatter`]). Where they
+//! Clips may deviate as far as those of another engine do from a twin that is given everything ([`RandomEffects`]). Where they
 //! deviate less under one hypothesis than under another, that speaks for it: the scale of the scatter is set to what makes
-//! the clips most likely (empirical Bayes), for every hypothesis by itself. Own numbers act linearly, so another scale
+//! the clips most likely (empirical Bayes), for every hypothesis by itself. Nuisance parameters act linearly, so another scale
 //! costs no simulation.
 
-use super::scatter::Scatter;
-use inference::kept::numbers::matrix;
+use super::random_effects::RandomEffects;
+use crate::kept::numbers::matrix;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Least scale that is tried, of the usual scatter: nothing real scatters less than an eighth of it.
-pub const LEAST: f64 = 0.125;
-/// Scales that are tried.
-const SCALES: [f64; 4] = [1.0, 0.5, 0.25, LEAST];
-/// Steps in which a clip finds its own numbers at another scale; every one takes the hold of the last.
+/// Least scale that is tried [1], a choice: nothing real scatters less than an eighth of the usual.
+pub const MIN_SCALE: f64 = 0.125;
+/// Scales of the usual scatter that are tried [1].
+const SCALES: [f64; 4] = [1.0, 0.5, 0.25, MIN_SCALE];
+/// Steps in which a clip finds its nuisance parameters at another scale [1]; every one takes the hold of the last.
 const STEPS: usize = 12;
 
-/// A clip around its own numbers.
+/// A clip around its nuisance parameters.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Around {
-    /// Products of (residual, own numbers), weighted.
+    /// Products of (residual, nuisance parameters), weighted.
     #[serde(with = "matrix")]
     pub gram: DMatrix<f64>,
-    /// The own numbers there.
+    /// Their values there.
     pub own: Vec<f64>,
 }
 
 /// What every clip's deviance changes by at the scale at which all of them together are most likely; nothing where no
 /// number has heavy tails.
-pub fn at_the_best_scale(clips: &[&Around], scatter: &Scatter) -> Vec<f64> {
+pub fn at_the_best_scale(clips: &[&Around], scatter: &RandomEffects) -> Vec<f64> {
     if scatter.heavy.is_empty() {
         return vec![0.0; clips.len()];
     }
@@ -42,8 +42,8 @@ pub fn at_the_best_scale(clips: &[&Around], scatter: &Scatter) -> Vec<f64> {
     best.unwrap_or_default()
 }
 
-/// `-2 ln` of a clip's likelihood with its own numbers at their best and integrated over.
-fn deviance(clip: &Around, scatter: &Scatter) -> f64 {
+/// `-2 ln` of a clip's likelihood with its nuisance parameters at their best and integrated over.
+fn deviance(clip: &Around, scatter: &RandomEffects) -> f64 {
     let n = clip.own.len();
     let (inner, cross) = (clip.gram.view((1, 1), (n, n)).into_owned(), clip.gram.view((1, 0), (n, 1)).into_owned());
     let cross = cross.column(0).into_owned();
@@ -69,7 +69,7 @@ fn deviance(clip: &Around, scatter: &Scatter) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use inference::estimate::Random;
+    use crate::estimate::Random;
 
     /// Clips with one random effect, each seen a hundred times with a noise of one sigma.
     fn clips(deviations: &[f64]) -> Vec<Around> {
@@ -79,9 +79,9 @@ mod tests {
         deviations.iter().map(|deviation| Around { gram: gram(*deviation), own: vec![0.0] }).collect()
     }
 
-    fn scatter(heavy: std::ops::Range<usize>) -> Scatter {
+    fn scatter(heavy: std::ops::Range<usize>) -> RandomEffects {
         let random = vec![Random { name: "deviation".into(), sigma: 4.0, step: 4.0 }];
-        Scatter { random, heavy, forgiving: 1.0 }
+        RandomEffects { random, heavy, forgiving: 1.0 }
     }
 
     fn changes(deviations: &[f64], heavy: std::ops::Range<usize>) -> f64 {

@@ -1,4 +1,4 @@
-//! How the object of a clip deviates from any simulated path, as numbers of the clip's own that are added to the simulated
+//! How the object of a clip deviates from any simulated path, as nuisance parameters that are added to the simulated
 //! poses, so that they cost no simulation.
 //!
 //! While the tool has hold of the object the error grows along the path: nobody simulates an impact or a push exactly. What
@@ -11,40 +11,55 @@
 //! An object alone begins from its measured motion. Where it tumbles, each impact of a corner multiplies what that start and the
 //! simulated impact are off by, so that it may come to rest elsewhere and turned otherwise by a lot.
 
-use inference::estimate::Random;
-use inference::forward::object::{Channel, ObjectClips, Part, Row};
+use super::{Channel, ObjectClips, Part, Row};
 use nalgebra::Vector3;
 use shared_mem::recording::ObjectSeries;
 
 /// A path shorter than this says nothing about how far along it the object is [m].
 const SHORT: f64 = 0.01;
 
-/// The own numbers: the deviation of a clip when the tool has let go, on the way there more than in proportion, and what
-/// the free slide makes of it by its end.
-///
-/// Sigmas: strokes of another engine deviate from the twin that is given their true parameters by 1 mm and 0.012 rad at the end of the
-/// path in a clip like most. Each of the two stages is allowed as much; how widely a session's clips scatter is estimated anyway
-/// ([`super::scatter_scale`]).
-const DEVIATIONS: [(&str, Coordinate, Shape, f64); 9] = [
-    ("x when let go", Coordinate::X, Shape::Held, 1e-3),
-    ("y when let go", Coordinate::Y, Shape::Held, 1e-3),
-    ("yaw when let go", Coordinate::Yaw, Shape::Held, 0.012),
-    ("x on the way", Coordinate::X, Shape::Way, 0.5e-3),
-    ("y on the way", Coordinate::Y, Shape::Way, 0.5e-3),
-    ("yaw on the way", Coordinate::Yaw, Shape::Way, 0.006),
-    ("along the slide", Coordinate::Along, Shape::InTime, 1e-3),
-    ("across the slide", Coordinate::Across, Shape::InWay, 1e-3),
-    ("yaw of the slide", Coordinate::Yaw, Shape::InWay, 0.012),
+/// One way in which a path deviates.
+#[derive(Debug, PartialEq)]
+pub struct Deviation {
+    pub(super) name: &'static str,
+    coordinate: Coordinate,
+    shape: Shape,
+    /// One sigma from clip to clip [m, rad].
+    pub(super) sigma: f64,
+}
+
+const fn deviation(name: &'static str, coordinate: Coordinate, shape: Shape, sigma: f64) -> Deviation {
+    Deviation { name, coordinate, shape, sigma }
+}
+
+/// Deviation of a clip's end, one sigma [m, rad]: strokes of another engine deviate from the twin that is given their true parameters by
+/// this at the end of the path in a clip like most. Each stage of a clip is allowed as much; how widely a session's clips scatter is
+/// estimated anyway ([`crate::forward::random_effects_scale`]).
+const PLACE: f64 = 1e-3;
+const TURN: f64 = 0.012;
+
+/// After a hit: the deviation when the tool has let go, on the way there more than in proportion, and what the free slide makes of it by
+/// its end.
+pub(super) const AFTER_HITS: [Deviation; 9] = [
+    deviation("x when let go", Coordinate::X, Shape::Held, PLACE),
+    deviation("y when let go", Coordinate::Y, Shape::Held, PLACE),
+    deviation("yaw when let go", Coordinate::Yaw, Shape::Held, TURN),
+    deviation("x on the way", Coordinate::X, Shape::Way, 0.5 * PLACE),
+    deviation("y on the way", Coordinate::Y, Shape::Way, 0.5 * PLACE),
+    deviation("yaw on the way", Coordinate::Yaw, Shape::Way, 0.5 * TURN),
+    deviation("along the slide", Coordinate::Along, Shape::InTime, PLACE),
+    deviation("across the slide", Coordinate::Across, Shape::InWay, PLACE),
+    deviation("yaw of the slide", Coordinate::Yaw, Shape::InWay, TURN),
 ];
 
-/// The same of an object alone, by the end of its motion: as wide as those of a free slide after a hit, so that a slide still shows
+/// Of an object alone, by the end of its motion: as wide as those of a free slide after a hit, so that a slide still shows
 /// what bends it. One that tumbles is beyond that by many times, which the heavy tails bear.
-const ALONE: [(&str, Coordinate, Shape, f64); 5] = [
-    ("along the motion", Coordinate::Along, Shape::InTime, 1e-3),
-    ("across the motion", Coordinate::Across, Shape::InTime, 1e-3),
-    ("yaw of the motion", Coordinate::Yaw, Shape::InTime, 0.012),
-    ("roll of the motion", Coordinate::Roll, Shape::InTime, 0.012),
-    ("pitch of the motion", Coordinate::Pitch, Shape::InTime, 0.012),
+pub(super) const ALONE: [Deviation; 5] = [
+    deviation("along the motion", Coordinate::Along, Shape::InTime, PLACE),
+    deviation("across the motion", Coordinate::Across, Shape::InTime, PLACE),
+    deviation("yaw of the motion", Coordinate::Yaw, Shape::InTime, TURN),
+    deviation("roll of the motion", Coordinate::Roll, Shape::InTime, TURN),
+    deviation("pitch of the motion", Coordinate::Pitch, Shape::InTime, TURN),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,34 +111,18 @@ impl Shape {
     }
 }
 
-fn all(alone: bool) -> &'static [(&'static str, Coordinate, Shape, f64)] {
-    if alone { &ALONE } else { &DEVIATIONS }
-}
-
-/// The own numbers with their scatter; `alone`: of objects alone.
-pub(in crate::diagnose) fn random(alone: bool) -> Vec<Random> {
-    let one = |(name, _, _, sigma): &(&str, Coordinate, Shape, f64)| Random {
-        name: (*name).into(),
-        sigma: *sigma,
-        step: *sigma,
-    };
-    all(alone).iter().map(one).collect()
-}
-
-/// What one unit of every number takes off the residuals of a clip, between `of_arm` rows of the arm alone and `in_contact`
-/// of the arm in contact. With the clips: whether objects move alone in them.
-pub(in crate::diagnose) fn slopes(
-    (object, alone): (&ObjectClips, bool),
+/// What one unit of every deviation takes off the residuals of a clip's poses [1/m, 1/rad].
+pub(super) fn slopes(
+    object: &ObjectClips,
     clip: usize,
-    of_arm: usize,
-    in_contact: usize,
+    deviations: impl Iterator<Item = &'static Deviation>,
 ) -> Vec<Vec<f64>> {
     let (mut rows, noise) = (object.rows(clip), object.noise());
     rows.retain(|row| !matches!(row.channel, Channel::Joint(_)));
     let series = &object.clip(clip).object;
     let along = direction(series, &rows);
     let fractions = fractions(series, &rows);
-    let one = |&(_, coordinate, shape, _): &(&str, Coordinate, Shape, f64)| {
+    let one = |Deviation { coordinate, shape, .. }: &'static Deviation| {
         let share = |channel: Channel| match (channel, coordinate) {
             (Channel::Position(0), Coordinate::X) | (Channel::Position(1), Coordinate::Y) => 1.0 / noise.position,
             (Channel::Position(axis @ (0 | 1)), Coordinate::Along) => along[axis] / noise.position,
@@ -134,12 +133,9 @@ pub(in crate::diagnose) fn slopes(
             | (Channel::Rotation(2), Coordinate::Yaw) => 1.0 / noise.rotation,
             _ => 0.0,
         };
-        let mut slopes = vec![0.0; of_arm];
-        slopes.extend(rows.iter().zip(&fractions).map(|(row, fractions)| -shape.at(fractions) * share(row.channel)));
-        slopes.extend(std::iter::repeat_n(0.0, in_contact));
-        slopes
+        rows.iter().zip(&fractions).map(|(row, fractions)| -shape.at(fractions) * share(row.channel)).collect()
     };
-    all(alone).iter().map(one).collect()
+    deviations.map(one).collect()
 }
 
 /// Place of the object at a stamp, or of its last pose.

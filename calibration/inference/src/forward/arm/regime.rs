@@ -1,6 +1,6 @@
 //! What a joint is commanded to do at a moment: it stands, or moves slowly or fast one way or the other.
 
-use shared_mem::recording::{Clip, JointSeries};
+use shared_mem::recording::JointSeries;
 
 /// A joint slower than this stands [rad/s].
 const STILL: f64 = 0.02;
@@ -11,10 +11,10 @@ const FAST: f64 = 0.5;
 pub(super) struct Regimes(Vec<f64>);
 
 impl Regimes {
-    pub(super) fn of(clips: &[Clip], dof: usize) -> Self {
+    pub(super) fn of<'a>(commands: impl Iterator<Item = &'a JointSeries> + Clone, dof: usize) -> Self {
         let speed = |joint: usize| {
-            let rows = clips.iter().flat_map(|clip| {
-                (0..clip.desired.len()).filter_map(move |row| clip.desired.dq_row(row).map(|dq| dq[joint].abs()))
+            let rows = commands.clone().flat_map(|desired| {
+                (0..desired.len()).filter_map(move |row| desired.dq_row(row).map(|dq| dq[joint].abs()))
             });
             rows.fold(0.0, f64::max)
         };
