@@ -6,10 +6,10 @@ use calibration::benchmark::world::{Fault, Kind, World};
 use calibration::identify::object::{Options, identify, identify_clips};
 use calibration::identify::{Identification, Optimizer};
 use inference::estimate::ClipModel as _;
-use inference::forward::Settings;
-use inference::forward::object::{Channel, Nuisance, ObjectClips, Part, Row, diagnosed};
-use inference::forward::setting::{complete, object_parameters};
 use inference::interrupt::Interrupt;
+use inference::likelihood::Settings;
+use inference::likelihood::object::{Channel, Nuisance, ObjectClips, Part, Row, diagnosed};
+use inference::likelihood::setting::{complete, object_parameters};
 use shared_mem::cell::ClipKind;
 use std::path::{Path, PathBuf};
 

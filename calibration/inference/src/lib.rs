@@ -6,8 +6,8 @@
 //! | [`child_output`] | what other programs say on their pipes |
 //! | [`engine`] | another program that simulates the arm |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
-//! | [`forward`] | what the twin makes of recorded clips, as residuals |
 //! | [`interrupt`] | Ctrl-C, and a budget of time |
+//! | [`likelihood`] | what the twin makes of recorded clips: residuals, and what varies from clip to clip |
 //! | [`kept`] | what long work has found so far, for when it is interrupted |
 //! | [`seed`] | what is drawn is drawn from it |
 //! | [`statistics`] | medians, and quantiles of distributions |
@@ -37,8 +37,8 @@
 pub mod child_output;
 pub mod engine;
 pub mod estimate;
-pub mod forward;
 pub mod interrupt;
 pub mod kept;
+pub mod likelihood;
 pub mod seed;
 pub mod statistics;

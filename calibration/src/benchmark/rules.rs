@@ -8,13 +8,13 @@
 
 use super::score::Said;
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::quadratic::minimum;
 use crate::diagnose::fit::shortlist;
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
-use inference::forward::random_effects::RandomEffects;
+use inference::likelihood::Evidence;
+use inference::likelihood::random_effects::RandomEffects;
 use nalgebra::DMatrix;
 
 /// Names in the order of [`all`].

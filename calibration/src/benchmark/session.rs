@@ -309,8 +309,9 @@ fn effect(name: &str, parameter: &str, value: f64) -> EffectTheta {
 mod tests {
     use super::super::world::Fault;
     use super::*;
-    use crate::diagnose::evidence::arm_clips::ArmClips;
     use inference::estimate::ClipModel;
+    use inference::likelihood::Likelihood as _;
+    use inference::likelihood::arm::ArmClips;
     use shared_mem::cell::Cell;
     use std::path::Path;
 

@@ -6,9 +6,6 @@ use super::score::{Case, Said, Truth};
 use super::world::World;
 use crate::diagnose::clips::admit::{Admitted, Refused};
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::arm_clips::ArmClips;
-use crate::diagnose::evidence::cell_clips::CellClips;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::floor;
@@ -17,10 +14,13 @@ use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::library::Library;
 use crate::diagnose::search::baseline;
 use crate::diagnose::{DiagnoseError, Diagnosis, Kind, Options, diagnose_clips, peaks};
-use inference::forward::object::ObjectClips;
-use inference::forward::setting;
 use inference::interrupt::Interrupt;
 use inference::kept::Kept;
+use inference::likelihood::Evidence;
+use inference::likelihood::arm::ArmClips;
+use inference::likelihood::cell::CellClips;
+use inference::likelihood::object::ObjectClips;
+use inference::likelihood::setting;
 use shared_mem::cell::{ClipEntry, ClipKind};
 use shared_mem::progress::Progress;
 use shared_mem::recording::{Clip, Session, SessionFiles};
@@ -45,7 +45,7 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let court = Court { world, library: &library, split, admitted: &admitted, interrupt };
     if admitted.with_object {
         let object = ObjectClips::new(&world.cell, admitted.clips.clone(), library.settings.clone())?;
-        court.cases(&CellClips::new(Some(arm), object, &library), &found)
+        court.cases(&CellClips::new(Some(arm), object, |numbers: &[f64]| library.felt_by_arm(numbers)), &found)
     } else {
         court.cases(&arm, &found)
     }

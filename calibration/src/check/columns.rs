@@ -1,6 +1,6 @@
 //! A clip as typed columns: seconds from its first row, one list of numbers a joint. SI, base frame.
 
-use inference::forward::arm::noise;
+use inference::likelihood::arm::noise;
 use nalgebra::Vector3;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, JointSeries, ObjectSeries};

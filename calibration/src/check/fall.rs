@@ -4,7 +4,7 @@ use super::columns::Columns;
 use super::limits::{CLEAR, FALL_FITS, FALL_OFF, FALL_POSES, FALL_SIGMAS, FALL_SURE};
 use super::remark::{Fault, Remark, Size};
 use super::statistics::median;
-use inference::forward::arm::noise;
+use inference::likelihood::arm::noise;
 use nalgebra::{Matrix3, Point3, Vector3};
 use shared_mem::cell::{Cell, ClipKind, GRAVITY};
 

@@ -5,7 +5,7 @@ use crate::diagnose::clips::admit;
 use crate::identify::arm::ArmError;
 use crate::identify::object::{ObjectError, shows_object};
 use crate::identify::remarks::grouped;
-use inference::forward::arm::ArmClips;
+use inference::likelihood::arm::ArmClips;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::recording::{Clip, PictureKind, ReadError, Session, for_pictures};

@@ -5,7 +5,7 @@ use super::columns::Columns;
 use super::limits::{CAMERA_OFF, LEANS, NEAR_HEIGHT, ORDER_SHARE, REST_POSES, RESTS, STANDS};
 use super::remark::{Fault, Remark, Severity, Size};
 use super::statistics::{deviation, mean};
-use inference::forward::arm::noise;
+use inference::likelihood::arm::noise;
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, ClipKind};
 use twin::scene::{ObjectModel, ObjectShape};

@@ -5,7 +5,7 @@ use super::conversion;
 use super::limits::{MOVES, NEAR_TURN, NOT_ITS_SLOPE};
 use super::remark::{Fault, Remark, Severity, Size};
 use super::statistics::{median, quantile, range};
-use inference::forward::arm::velocity::{Compared, Motion, late};
+use inference::likelihood::arm::velocity::{Compared, Motion, late};
 use std::f64::consts::TAU;
 
 /// Every joint that moves enough to tell.

@@ -1,14 +1,14 @@
-//! The candidates: every effect of the registry that can show in the clips, as numbers a search may turn, with the probes
+//! The candidates: every effect of the registry that can show in the clips, as parameters to search, with the probes
 //! by which its signature is taken.
 //!
-//! A signature is a difference over a finite step of the size that is met in practice, not a slope at zero: dry friction,
+//! A signature is a difference over a finite step of a plausible size, not a slope at zero: dry friction,
 //! play and saturation have no slope there. An effect with a form beside its size (a place, an axis, a speed) has one
 //! alternative for each of a few forms.
 
 use crate::diagnose::clips::ground::{Ground, Patch};
 use crate::diagnose::known_gains;
 use inference::estimate::Unknown;
-use inference::forward::setting::{self, Setting, Settings};
+use inference::likelihood::setting::{self, Setting, Settings};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use std::ops::Range;
@@ -68,7 +68,7 @@ pub struct Probe {
     pub moves: Vec<(usize, f64)>,
     /// Whether it acts one way only.
     pub one_sided: bool,
-    /// Units at the strongest that is met in practice.
+    /// Units at the strongest that is plausible.
     pub largest: f64,
 }
 
@@ -83,7 +83,7 @@ impl Candidate {
         self.effect.parameters.iter().any(|parameter| parameter.search == search)
     }
 
-    /// One of the sizes at the strongest that is met in practice; `resting`: where it changes nothing.
+    /// One of the sizes at the strongest that is plausible; `resting`: where it changes nothing.
     pub fn strongest(&self, size: usize, resting: f64) -> Option<f64> {
         let mut probes = self.alternatives.iter().flat_map(|alternative| &alternative.probes);
         let probe = probes.find(|probe| probe.moves[0].0 == size)?;
@@ -100,7 +100,7 @@ impl Library {
         let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
         let mut numbers = setting::arm_numbers(cell, base);
         if with_object {
-            // How heavy an object is that moves by itself no pose tells.
+            // How heavy an object is that moves by itself no pose shows.
             let shows = |(setting, _): &(Setting, Unknown)| cell.robot.is_some() || *setting != Setting::Mass;
             numbers.extend(setting::object_parameters(cell, base).into_iter().filter(shows));
         }
@@ -126,7 +126,7 @@ impl Library {
                     unknown.step = BOUND_STEP / bound;
                 }
             }
-            candidates.push(Candidate::new(effect, at, &numbers, (ground, peaks, &robot)));
+            candidates.push(Candidate::new(effect, at, &numbers, Setup { ground, peaks, robot: &robot }));
         }
         let joint = |setting| joint_of(setting).filter(|_| !(with_object && moves_the_tip_unseen(setting)));
         let joints = numbers.iter().map(|(setting, _)| joint(setting)).collect();
@@ -218,14 +218,13 @@ impl Library {
         (0..numbers.len()).filter(|k| self.arm_feels(*k, numbers)).map(|k| numbers[k]).collect()
     }
 
-    /// Values of the parameter behind a number of an effect that are met in practice on this robot; `None` for numbers of the
+    /// Values of the parameter behind a number of an effect that are plausible on this robot; `None` for numbers of the
     /// baseline.
-    pub fn met(&self, number: usize) -> Option<[f64; 2]> {
-        met(&self.robot, &self.settings.settings()[number])
+    pub fn plausible(&self, number: usize) -> Option<[f64; 2]> {
+        plausible(&self.robot, &self.settings.settings()[number])
     }
 
     /// How strong effects may be on this robot.
-    #[must_use]
     pub fn robot(&self) -> &Robot {
         &self.robot
     }
@@ -250,7 +249,7 @@ fn joint_of(setting: &Setting) -> Option<usize> {
     }
 }
 
-/// Whether a number of a joint moves the tip by what no sensor of the arm need show: nothing tells of a vertical joint's
+/// Whether a number of a joint moves the tip by what no sensor of the arm need show: nothing shows of a vertical joint's
 /// encoder but what the tip hits.
 fn moves_the_tip_unseen(setting: &Setting) -> bool {
     setting.of_effect().is_some_and(|parameter| parameter.moves_tip_unseen)
@@ -284,7 +283,7 @@ fn felt_with(setting: &Setting) -> Option<&'static str> {
 }
 
 impl Candidate {
-    fn new(effect: &'static EffectInfo, at: usize, numbers: &[(Setting, Unknown)], met: Met<'_>) -> Self {
+    fn new(effect: &'static EffectInfo, at: usize, numbers: &[(Setting, Unknown)], setup: Setup<'_>) -> Self {
         let is_size = |setting: &Setting| match setting {
             Setting::Effect { parameter, .. } => {
                 effect.parameters.iter().any(|p| p.name == *parameter && matches!(p.role, Role::Size { .. }))
@@ -294,7 +293,7 @@ impl Candidate {
         let sizes: Vec<usize> = (at..numbers.len()).filter(|k| is_size(&numbers[*k].0)).collect();
         let (held, turned): (Vec<usize>, Vec<usize>) = (at..numbers.len()).partition(|k| is_held(&numbers[*k].0));
         let held = held.into_iter().filter(|k| numbers[*k].0.search() == Some(Search::Held)).collect();
-        let alternatives = alternatives(effect, at, &sizes, numbers, met);
+        let alternatives = alternatives(effect, at, &sizes, numbers, setup);
         Self { effect, numbers: at..numbers.len(), turned, held, sizes, alternatives }
     }
 }
@@ -327,14 +326,21 @@ const BITES: f64 = 0.9;
 const BOUND_STEP: f64 = 0.01;
 const LOWEST_LIMIT: f64 = 0.03;
 
-/// The step of a probe as a share of what is met in practice.
+/// The step of a probe as a share of what is plausible.
 const PROBE_SHARE: f64 = 0.1;
 
-/// Where objects slid, what the joints were asked for [N m], and what is met on such a robot.
-type Met<'a> = (Option<&'a Ground>, &'a Joints, &'a Robot);
+/// What decides which probes of an effect make sense.
+#[derive(Clone, Copy)]
+struct Setup<'a> {
+    /// Where objects slid.
+    ground: Option<&'a Ground>,
+    /// What the joints were asked for [N m].
+    peaks: &'a Joints,
+    robot: &'a Robot,
+}
 
-/// Values of the parameter behind a number of an effect that are met in practice on a robot.
-fn met(robot: &Robot, setting: &Setting) -> Option<[f64; 2]> {
+/// Values of the parameter behind a number of an effect that are plausible on a robot.
+fn plausible(robot: &Robot, setting: &Setting) -> Option<[f64; 2]> {
     let Setting::Effect { index, .. } = *setting else { return None };
     setting.of_effect().map(|parameter| robot.range(parameter, index))
 }
@@ -344,7 +350,7 @@ fn alternatives(
     at: usize,
     sizes: &[usize],
     numbers: &[(Setting, Unknown)],
-    (ground, peaks, robot): Met<'_>,
+    Setup { ground, peaks, robot }: Setup<'_>,
 ) -> Vec<Alternative> {
     let probe = |k: &usize| match bound_of(&numbers[*k].0, peaks) {
         Some(peak) => biting(*k, peak, &numbers[*k].1),
@@ -405,7 +411,7 @@ fn across(
 ) -> Vec<Probe> {
     let share = 2.0 * PROBE_SHARE;
     let of = |(size, number): (&usize, &usize)| {
-        let [_, strongest] = met(robot, &numbers[*size].0).expect("a size is a parameter");
+        let [_, strongest] = plausible(robot, &numbers[*size].0).expect("a size is a parameter");
         Probe { moves: vec![(*size, share * strongest), (*number, angle)], one_sided: false, largest: share.recip() }
     };
     sizes.iter().zip(angles).map(of).collect()
@@ -414,7 +420,7 @@ fn across(
 fn probe(number: usize, (setting, unknown): &(Setting, Unknown), robot: &Robot) -> Probe {
     let Setting::Effect { inverse, .. } = setting else { unreachable!("sizes belong to effects") };
     let info = setting.of_effect().expect("a size is a parameter");
-    let [lo, hi] = met(robot, setting).expect("a size is a parameter");
+    let [lo, hi] = plausible(robot, setting).expect("a size is a parameter");
     let reach = match info.usual {
         _ if *inverse => lo.recip(),
         Some(usual) => (usual - unknown.start).abs(),

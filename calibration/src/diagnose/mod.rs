@@ -9,7 +9,6 @@
 //! | [`clips`] | which recorded clips can be diagnosed, how much of them counts, and what each is for |
 //! | [`criteria`] | the measured numbers that decide |
 //! | [`library`], `known_gains` | the candidates as numbers; how far gains stated by value may be off |
-//! | [`evidence`] | what is measured against the twin, where in a clip, and how far clips deviate by themselves |
 //! | [`fit`] | hypotheses linearised around clips and fitted to them |
 //! | [`judge`] | how well a hypothesis predicts clips, how much of the gap it closes, how sure that is, and what is left |
 //! | [`propose`] | which candidates are tried, on what, and where their fits begin |
@@ -24,7 +23,6 @@ pub mod answer;
 pub mod clips;
 pub mod conclude;
 pub mod criteria;
-pub mod evidence;
 pub mod fit;
 pub mod judge;
 mod known_gains;
@@ -35,6 +33,8 @@ pub mod search;
 mod test_bench;
 #[cfg(test)]
 mod test_cell;
+#[cfg(test)]
+mod test_likelihood;
 
 pub use answer::{
     Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Remedy, Rest, SensorGap,
@@ -43,15 +43,15 @@ pub use answer::{
 
 use crate::identify::arm::{self, ArmError};
 use clips::admit::{Admitted, Refused, admit};
-use evidence::arm_clips::ArmClips;
-use evidence::cell_clips::CellClips;
-use evidence::measured::Evidence;
 use fit::bench::Bench;
 use inference::engine::{Engine, EngineError, Quantity, Used};
-use inference::forward::object::ObjectClips;
-use inference::forward::setting::{self, BaseError};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept, Trail};
+use inference::likelihood::Evidence;
+use inference::likelihood::arm::ArmClips;
+use inference::likelihood::cell::CellClips;
+use inference::likelihood::object::ObjectClips;
+use inference::likelihood::setting::{self, BaseError};
 use library::Library;
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
@@ -232,7 +232,8 @@ fn diagnosed(
         let arm = robot.map(|_| ArmClips::moments(&session.cell, &admitted.clips, theta)).transpose();
         let arm = arm.map_err(Refused::from)?.map(|arm| arm.moved_by(options.engine.clone(), &nominal));
         let object = ObjectClips::new(&session.cell, admitted.clips.clone(), library.settings.clone())?;
-        let evidence = CellClips::new(arm, object.simulated_by(engine, &nominal), &library);
+        let evidence =
+            CellClips::new(arm, object.simulated_by(engine, &nominal), |numbers: &[f64]| library.felt_by_arm(numbers));
         examine(&evidence, &library, session, admitted, options, work)?
     } else {
         let evidence = ArmClips::moments(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;

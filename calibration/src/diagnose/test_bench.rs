@@ -5,18 +5,18 @@ use crate::benchmark::draw;
 use crate::benchmark::session::record;
 use crate::benchmark::world::{Fault, Kind, World};
 use crate::diagnose::clips::ground::Ground;
-use crate::diagnose::evidence::arm_clips::ArmClips;
-use crate::diagnose::evidence::cell_clips::CellClips;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::fit::sweep::Precision;
-use inference::forward::object::ObjectClips;
-use inference::forward::setting;
 use inference::interrupt::Interrupt;
 use inference::kept::Kept;
+use inference::likelihood::Evidence;
+use inference::likelihood::arm::ArmClips;
+use inference::likelihood::cell::CellClips;
+use inference::likelihood::object::ObjectClips;
+use inference::likelihood::setting;
 use shared_mem::cell::Cell;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::theta::Theta;
@@ -73,7 +73,7 @@ pub(super) fn on_strokes<R>(
     let theta = |numbers: &[f64]| library.theta(numbers);
     let arm = ArmClips::moments(cell, &clips, &theta as Parameters<'_>).expect("an arm");
     let object = ObjectClips::new(cell, clips, library.settings.clone()).expect("an object");
-    let evidence = CellClips::new(Some(arm), object, &library);
+    let evidence = CellClips::new(Some(arm), object, |numbers: &[f64]| library.felt_by_arm(numbers));
     let interrupt = Interrupt::default();
     ask(&bench(&evidence, &library, &interrupt), &floor::sensors_alone(&evidence))
 }

@@ -13,13 +13,13 @@ use super::subjects::Subject;
 use super::turned::Side;
 use crate::diagnose::conclude::advice;
 use crate::diagnose::conclude::site::{Advice, Site};
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::localise;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes::Sizes;
-use inference::forward::Setting;
+use inference::likelihood::Evidence;
+use inference::likelihood::Setting;
 use shared_mem::recording::Session;
 use std::collections::BTreeMap;
 

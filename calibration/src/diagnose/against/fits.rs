@@ -2,13 +2,13 @@
 
 use super::turned::{Model, SIDES, Side, TwoSessions, side_of};
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out;
 use crate::diagnose::judge::score::{Predicted, predict};
 use crate::diagnose::judge::trial::NEARLY_ALL;
+use inference::likelihood::Evidence;
 use inference::statistics::{median, student_sigmas};
 
 /// What all fits share.

@@ -37,19 +37,19 @@ use super::{DiagnoseError, Options, Work, peaks};
 use crate::diagnose::clips::admit::Refused;
 use crate::diagnose::clips::split::{FEW, Split};
 use crate::diagnose::clips::torques;
-use crate::diagnose::evidence::arm_clips::ArmClips;
-use crate::diagnose::evidence::cell_clips::CellClips;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::stages;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::search::{baseline, combine};
 use fits::PairBench;
-use inference::forward::object::ObjectClips;
-use inference::forward::setting;
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept};
+use inference::likelihood::Evidence;
+use inference::likelihood::arm::ArmClips;
+use inference::likelihood::cell::CellClips;
+use inference::likelihood::object::ObjectClips;
+use inference::likelihood::setting;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -132,7 +132,13 @@ fn compared(
         Some(arm) if !admitted.with_object => examine(&arm, &library, (sessions, pair), options, work)?,
         arm => {
             let object = ObjectClips::new(cell, admitted.clips.clone(), library.settings.clone())?;
-            examine(&CellClips::new(arm, object, &library), &library, (sessions, pair), options, work)?
+            examine(
+                &CellClips::new(arm, object, |numbers: &[f64]| library.felt_by_arm(numbers)),
+                &library,
+                (sessions, pair),
+                options,
+                work,
+            )?
         }
     };
     if torques::is_tracking(cell) {

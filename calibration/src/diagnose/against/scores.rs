@@ -8,12 +8,12 @@
 use super::super::library::Library;
 use super::subjects::Subject;
 use super::turned::{Acts, Model, SIDES, Side, side_of};
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::quadratic::{bounded_minimum, eliminate, minimum};
 use crate::diagnose::fit::shortlist::{Scored, chance};
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
+use inference::likelihood::Evidence;
 use inference::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 
@@ -305,7 +305,7 @@ fn weights<E: Evidence>(bench: &Bench<'_, E>, swept: &[Swept; 2]) -> Option<Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use inference::forward::random_effects::RandomEffects;
+    use inference::likelihood::random_effects::RandomEffects;
 
     /// (1 - a - 2 b)^2 + (3 - b)^2 over (1, a, b).
     fn form() -> DMatrix<f64> {

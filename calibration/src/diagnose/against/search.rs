@@ -4,12 +4,12 @@ use super::fits::{Fitted, LEAST, PairBench, Worth};
 use super::scores::{Score, Slopes, is_apart};
 use super::subjects::Subject;
 use super::turned::Model;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT};
 use crate::diagnose::fit::stages;
 use crate::diagnose::search::refit::last_pass;
 use crate::page::words;
+use inference::likelihood::Evidence;
 use shared_mem::progress::{Planned, Progress};
 
 /// At most so many changes are named, and so many effects that both sessions have are found on the way.

@@ -4,10 +4,10 @@
 //! library are turned and in which session each acts; what is not turned stays where it is.
 
 use super::super::library::Library;
-use crate::diagnose::evidence::measured::{Channel, Evidence, Measured, Near, Row};
 use inference::estimate::{ClipModel, Impossible, Unknown};
-use inference::forward::Setting;
-use inference::forward::random_effects::{RandomEffects, WithOwn};
+use inference::likelihood::Setting;
+use inference::likelihood::random_effects::{RandomEffects, WithOwn};
+use inference::likelihood::{Channel, Evidence, Likelihood, Near, Row};
 
 /// One of the two sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,7 +159,7 @@ impl<E: Evidence> ClipModel for TwoSessions<'_, E> {
     }
 }
 
-impl<E: Evidence> Measured for TwoSessions<'_, E> {
+impl<E: Evidence> Likelihood for TwoSessions<'_, E> {
     type Own = WithOwn;
 
     fn changed(

@@ -5,7 +5,7 @@ use super::torques::{self, is_tracking};
 use super::{length, split};
 use crate::identify::object::screen::{Screened, screened};
 use crate::identify::remarks::grouped;
-use inference::forward::arm::one_piece;
+use inference::likelihood::arm::one_piece;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, JointSeries, ReadError, Session};
 use twin::arm::{ArmModel, ModelError};

@@ -5,8 +5,8 @@
 //! ([`ControllerKind::Tracking`]), and this torque is held against the measured one. Effects on the way of a command do not show;
 //! friction, payloads, base tilts and the like do, gains and delays or not.
 
-pub(in crate::diagnose) use inference::forward::arm::is_tracking;
-use inference::forward::smoothing;
+pub(in crate::diagnose) use inference::likelihood::arm::is_tracking;
+use inference::likelihood::smoothing;
 use shared_mem::cell::{Cell, Controller, ControllerKind, Robot};
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::theta::Theta;

@@ -9,7 +9,6 @@ use crate::diagnose::answer::{Change, Clips, Diagnosis, Gap, Nearest, NextMotion
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::clips::split::{self, Split};
 use crate::diagnose::criteria::CLASS_IS_RIGHT;
-use crate::diagnose::evidence::measured::{Evidence, Group};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use crate::diagnose::judge::confirm::confirm;
@@ -26,6 +25,7 @@ use crate::diagnose::library::Library;
 use crate::diagnose::search::refit;
 use crate::diagnose::{DiagnoseError, Kind, Options};
 use crate::page::{Trace, channel_in_words, effect_in_words, words};
+use inference::likelihood::{Evidence, Group};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 

@@ -6,7 +6,6 @@ use super::verdict::Finding;
 use crate::diagnose::Kind;
 use crate::diagnose::answer::{Candidate, Share, Status};
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
@@ -15,6 +14,7 @@ use crate::diagnose::judge::gap::{DOUBLED, Residuals};
 use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::judge::{confidence, held_out};
 use crate::diagnose::propose::screening;
+use inference::likelihood::Evidence;
 
 /// What nobody fitted closes nothing.
 const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };

@@ -2,12 +2,12 @@
 
 use super::verdict::Finding;
 use crate::diagnose::answer::{Kind, Status};
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::shortlist::{BY_CHANCE, TESTABLE};
 use crate::diagnose::judge::score::Advantage;
 use crate::diagnose::judge::trial::{Found, NEARLY_ALL, PLAIN, Trial, WORTHWHILE, convincing};
 use crate::page::words;
+use inference::likelihood::Evidence;
 
 /// A candidate with all that its reason is drawn from.
 #[derive(Debug, Clone, Copy)]

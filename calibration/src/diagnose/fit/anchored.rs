@@ -10,12 +10,12 @@
 //! models differ by in what a number changes. What is chosen is fitted to the engine's own roll-outs afterwards.
 
 use super::bench::Bench;
-use crate::diagnose::evidence::measured::{Channel, Evidence, Group, Measured, Near, Reach, Row};
 use inference::engine::Engine;
 use inference::estimate::{ClipModel, Impossible};
-use inference::forward::arm::following::Moment;
-use inference::forward::random_effects::{RandomEffects, WithOwn};
-use inference::forward::recent::Recent;
+use inference::likelihood::arm::following::Moment;
+use inference::likelihood::random_effects::{RandomEffects, WithOwn};
+use inference::likelihood::recent::Recent;
+use inference::likelihood::{Channel, Evidence, Group, Likelihood, Near, Reach, Row};
 use std::sync::Arc;
 
 /// Clips around a point where another program simulates strokes; elsewhere the clips as they are.
@@ -88,7 +88,7 @@ impl<E: Evidence> ClipModel for Anchored<'_, E> {
     }
 }
 
-impl<E: Evidence> Measured for Anchored<'_, E> {
+impl<E: Evidence> Likelihood for Anchored<'_, E> {
     type Own = WithOwn;
 
     fn changed(
@@ -152,7 +152,7 @@ impl<E: Evidence> Measured for Anchored<'_, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::evidence::measured::StageName;
+    use inference::likelihood::StageName;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// A row of the arm and one of the object; the engine's residuals bend, the twin's are straight.
@@ -185,7 +185,7 @@ mod tests {
         }
     }
 
-    impl Measured for Bent {
+    impl Likelihood for Bent {
         type Own = WithOwn;
 
         fn changed(

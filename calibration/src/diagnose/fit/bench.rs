@@ -4,11 +4,11 @@
 use super::effort::Effort;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
-use crate::diagnose::evidence::measured::Measured;
 use crate::diagnose::library::Library;
-use inference::forward::random_effects::{RandomEffects, WithOwn};
 use inference::interrupt::Interrupt;
 use inference::kept::{Fingerprint, Trail};
+use inference::likelihood::Likelihood;
+use inference::likelihood::random_effects::{RandomEffects, WithOwn};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
@@ -104,7 +104,7 @@ fn least(effect: &EffectInfo) -> f64 {
     }
 }
 
-impl<E: Measured> Bench<'_, E> {
+impl<E: Likelihood> Bench<'_, E> {
     /// Numbers that are free when these effects act.
     pub fn free(&self, effects: &[usize]) -> Vec<usize> {
         let of_effects = effects.iter().flat_map(|effect| self.library.candidates[*effect].turned.clone());

@@ -1,10 +1,10 @@
 //! What clips cost at numbers: squared weighted residuals, and the clips' own numbers in their sigmas.
 
 use super::bench::Bench;
-use crate::diagnose::evidence::measured::Measured;
+use inference::likelihood::Likelihood;
 use rayon::prelude::*;
 
-impl<E: Measured> Bench<'_, E> {
+impl<E: Likelihood> Bench<'_, E> {
     /// Sum of squared weighted residuals and of the own numbers in their sigmas.
     pub(in crate::diagnose) fn cost(&self, full: &[f64], clips: &[(usize, Vec<f64>)], weights: &[f64]) -> Option<f64> {
         Some(self.costs(full, clips, weights)?.iter().sum::<f64>()).filter(|cost| cost.is_finite())

@@ -10,8 +10,8 @@ use super::bench::{Bench, Clips};
 use super::effort::Effort;
 use super::floor;
 use super::sweep::{Reduced, Swept};
-use crate::diagnose::evidence::measured::Measured;
 use inference::estimate::Descent;
+use inference::likelihood::Likelihood;
 use nalgebra::{DMatrix, DVector};
 
 /// A fit has converged when a step promises less than this of the deviance: a fiftieth of a nat decides nothing. Where more is
@@ -33,7 +33,7 @@ struct Step {
     turned_round: bool,
 }
 
-impl<E: Measured> Bench<'_, E> {
+impl<E: Likelihood> Bench<'_, E> {
     /// At most so many damped steps of some numbers and of the clips' own; the last linearisation too, where no step from it was
     /// worth it. `None` when the twin has no answer at the start.
     pub(super) fn descended(
@@ -139,14 +139,14 @@ impl<E: Measured> Bench<'_, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::evidence::measured::{Channel, Group, Row, StageName};
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{bench, shipped};
     use inference::estimate::{ClipModel, Impossible};
-    use inference::forward::random_effects::{RandomEffects, WithOwn};
-    use inference::forward::setting;
     use inference::interrupt::Interrupt;
+    use inference::likelihood::random_effects::{RandomEffects, WithOwn};
+    use inference::likelihood::setting;
+    use inference::likelihood::{Channel, Group, Row, StageName};
     use shared_mem::msg::MAX_JOINTS;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -188,7 +188,7 @@ mod tests {
         }
     }
 
-    impl Measured for Bent<'_> {
+    impl Likelihood for Bent<'_> {
         type Own = WithOwn;
 
         fn channels(&self) -> &[Channel] {

@@ -7,27 +7,27 @@
 use super::quadratic::minimum;
 use super::shortlist;
 use super::sweep::{Column, Swept};
-use crate::diagnose::evidence::measured::{Channel, Group, Measured};
-use crate::diagnose::evidence::noise::correlation_length;
 use crate::diagnose::library::Library;
 use inference::estimate::Impossible;
+use inference::likelihood::arm::noise::correlation_length;
+use inference::likelihood::{Channel, Group, Likelihood};
 use inference::statistics::median;
 use nalgebra::{DMatrix, DVector};
 
 /// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any
 /// engine is off there by many times their noise.
-pub fn sensors_alone(evidence: &impl Measured) -> Vec<f64> {
+pub fn sensors_alone(evidence: &impl Likelihood) -> Vec<f64> {
     let known = |channel: &Channel| if channel.group == Group::Contact { 0.0 } else { 1.0 };
     evidence.channels().iter().map(known).collect()
 }
 
 /// Factor on each channel of residuals given clip by clip, one list of values a row.
-pub fn weights(evidence: &impl Measured, clips: &[(usize, Vec<f64>)]) -> Vec<f64> {
+pub fn weights(evidence: &impl Likelihood, clips: &[(usize, Vec<f64>)]) -> Vec<f64> {
     let channels = evidence.channels().len();
     (0..channels).map(|channel| weight(evidence, clips, channel)).collect()
 }
 
-fn weight(evidence: &impl Measured, clips: &[(usize, Vec<f64>)], channel: usize) -> f64 {
+fn weight(evidence: &impl Likelihood, clips: &[(usize, Vec<f64>)], channel: usize) -> f64 {
     let of_clip = |(clip, residuals): &(usize, Vec<f64>)| {
         let of_channel: Vec<f64> = (evidence.rows(*clip).iter().zip(residuals))
             .filter(|(row, _)| row.channel == channel)
@@ -58,7 +58,7 @@ fn weight(evidence: &impl Measured, clips: &[(usize, Vec<f64>)], channel: usize)
 /// As of [`Swept::reduced`].
 pub fn richest_residuals(
     swept: &Swept,
-    evidence: &impl Measured,
+    evidence: &impl Likelihood,
     library: &Library,
     weights: &[f64],
 ) -> Result<Vec<(usize, Vec<f64>)>, Impossible> {
@@ -90,7 +90,7 @@ pub fn richest_residuals(
 /// As of [`Swept::own_after`].
 pub fn residuals_at(
     swept: &Swept,
-    evidence: &impl Measured,
+    evidence: &impl Likelihood,
     weights: &[f64],
     free: &[usize],
     at: &[f64],

@@ -3,7 +3,7 @@
 
 use super::bench::{Bench, Hypothesis};
 use super::quadratic::minimum;
-use crate::diagnose::evidence::measured::Evidence;
+use inference::likelihood::Evidence;
 use nalgebra::DMatrix;
 
 /// How far the free numbers move to the minimum of a form over (residual, free numbers), within their bounds.

@@ -9,9 +9,9 @@
 
 use super::bench::{Bench, Hypothesis};
 use super::quadratic::minimum;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::page::{Size, UNBOUNDED};
-use inference::forward::setting::Setting;
+use inference::likelihood::Evidence;
+use inference::likelihood::setting::Setting;
 use inference::statistics::student_sigmas;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -52,7 +52,7 @@ pub fn of_effect_moved<E: Evidence>(
             let half = if rough && half > 0.0 { half.hypot(NINETY * bench.library.unknowns[k].step) } else { half };
             let unknown = candidate.sizes.contains(&k) || candidate.held.contains(&k);
             let open = unknown && !hypothesis.free.contains(&k);
-            let interval = match bench.library.met(k).unwrap_or(parameter.plausible) {
+            let interval = match bench.library.plausible(k).unwrap_or(parameter.plausible) {
                 _ if !open => [value - half + moved.min(0.0), value + half + moved.max(0.0)],
                 [low, _] if inverse => [0.0, low.recip()],
                 plausible => plausible,

@@ -6,7 +6,7 @@
 
 use super::bench::{Bench, Clips};
 use super::sweep::Precision;
-use crate::diagnose::evidence::measured::Measured;
+use inference::likelihood::Likelihood;
 use inference::statistics::median;
 use nalgebra::DVector;
 
@@ -19,7 +19,7 @@ const LEAST: f64 = 100.0;
 const TRIED: [f64; 4] = [-5.0, -2.5, 2.5, 5.0];
 const KEPT: [f64; 2] = [0.5, 1.0];
 
-impl<E: Measured> Bench<'_, E> {
+impl<E: Likelihood> Bench<'_, E> {
     /// Clips with their own numbers, those that stand out where they cost least; those without an answer as they were.
     pub(in crate::diagnose) fn restarted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Clips {
         if self.scatter.count() == self.scatter.heavy.len() {
@@ -75,13 +75,13 @@ fn outstanding(costs: &[f64]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::evidence::measured::{Channel, Group, Row, StageName};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{bench, shipped};
     use inference::estimate::{ClipModel, Impossible, Random};
-    use inference::forward::random_effects::{RandomEffects, WithOwn};
-    use inference::forward::setting;
     use inference::interrupt::Interrupt;
+    use inference::likelihood::random_effects::{RandomEffects, WithOwn};
+    use inference::likelihood::setting;
+    use inference::likelihood::{Channel, Group, Row, StageName};
     use shared_mem::msg::MAX_JOINTS;
 
     const SIGMA: f64 = 0.02;
@@ -103,7 +103,7 @@ mod tests {
         }
     }
 
-    impl Measured for TouchedTwice {
+    impl Likelihood for TouchedTwice {
         type Own = WithOwn;
 
         fn channels(&self) -> &[Channel] {

@@ -9,12 +9,12 @@
 //! ([`Precision::Joints`]): a stiff controller leaves little of one joint in another. That costs a seventh of turning
 //! them one by one ([`Precision::Exact`]).
 
-use crate::diagnose::evidence::measured::{Group, Measured, Reach};
 use crate::diagnose::library::{Alternative, Library};
 use inference::estimate::{Eliminated, Impossible};
-use inference::forward::random_effects::RandomEffects;
-use inference::forward::random_effects_scale::Around;
 use inference::kept::numbers::matrix;
+use inference::likelihood::random_effects::RandomEffects;
+use inference::likelihood::random_effects_scale::Around;
+use inference::likelihood::{Group, Likelihood, Reach};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -91,7 +91,7 @@ type Batch = Vec<usize>;
 /// [`Impossible`] when the point itself has no answer, or `go_on` says no; it is told, before each simulation, which share of a
 /// clip's that is. A column without an answer counts as one that changes nothing.
 pub fn sweep(
-    evidence: &impl Measured,
+    evidence: &impl Likelihood,
     library: &Library,
     point: &Point<'_>,
     scatter: &RandomEffects,
@@ -156,7 +156,7 @@ struct Work<'a, E, G> {
     go_on: &'a G,
 }
 
-impl<E: Measured, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
+impl<E: Likelihood, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
     fn clip(&self, clip: usize, own: &[f64]) -> Result<SweptClip, Impossible> {
         let mut base = Vec::new();
         self.evidence.residuals(clip, self.full, own, &mut base)?;
@@ -194,7 +194,7 @@ impl<E: Measured, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         let (rows, channels) = (self.evidence.rows(clip), self.evidence.channels());
         let column = |(k, units): (&usize, &f64)| {
             let joint = joint_of(self.library, self.columns[*k]).filter(|_| batch.len() > 1);
-            let slope = |((out, base), row): ((&f64, &f64), &crate::diagnose::evidence::measured::Row)| {
+            let slope = |((out, base), row): ((&f64, &f64), &inference::likelihood::Row)| {
                 let channel = &channels[row.channel];
                 let foreign = joint.is_some_and(|joint| channel.joint != Some(joint));
                 // What the arm feels is not learned from contact: see `contact.rs`.
@@ -264,11 +264,11 @@ impl Swept {
     ///
     /// # Errors
     /// As of [`Eliminated::of`].
-    pub fn reduced(&self, evidence: &impl Measured, weights: &[f64]) -> Result<Vec<Reduced>, Impossible> {
+    pub fn reduced(&self, evidence: &impl Likelihood, weights: &[f64]) -> Result<Vec<Reduced>, Impossible> {
         self.clips.par_iter().map(|clip| self.reduce(clip, evidence, weights)).collect()
     }
 
-    fn reduce(&self, clip: &SweptClip, evidence: &impl Measured, weights: &[f64]) -> Result<Reduced, Impossible> {
+    fn reduce(&self, clip: &SweptClip, evidence: &impl Likelihood, weights: &[f64]) -> Result<Reduced, Impossible> {
         let gram = gram(clip, evidence, weights);
         // The residual and the clip's own numbers, without the columns between them.
         let of_clip = |k: usize| if k == 0 { 0 } else { self.columns.len() + k };
@@ -291,7 +291,7 @@ impl Swept {
     pub fn own_after(
         &self,
         clip: &SweptClip,
-        evidence: &impl Measured,
+        evidence: &impl Likelihood,
         weights: &[f64],
         at: &DVector<f64>,
     ) -> Result<Vec<f64>, Impossible> {
@@ -304,7 +304,7 @@ impl Swept {
 }
 
 /// Products of all columns of a clip, weighted.
-fn gram(clip: &SweptClip, evidence: &impl Measured, weights: &[f64]) -> DMatrix<f64> {
+fn gram(clip: &SweptClip, evidence: &impl Likelihood, weights: &[f64]) -> DMatrix<f64> {
     let mut weighted = clip.matrix.clone();
     let factors: Vec<f64> = evidence.rows(clip.clip).iter().map(|row| weights[row.channel]).collect();
     for mut column in weighted.column_iter_mut() {
@@ -317,7 +317,7 @@ fn gram(clip: &SweptClip, evidence: &impl Measured, weights: &[f64]) -> DMatrix<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use inference::forward::setting;
+    use inference::likelihood::setting;
     use shared_mem::cell::Cell;
     use shared_mem::msg::MAX_JOINTS;
     use std::path::Path;

@@ -7,7 +7,7 @@
 
 use super::bench::{Bench, Hypothesis};
 use super::sweep::Precision;
-use crate::diagnose::evidence::measured::Evidence;
+use inference::likelihood::Evidence;
 use nalgebra::DVector;
 
 /// From the difference to half steps to the whole error of whole ones.
@@ -44,7 +44,7 @@ mod tests {
     use crate::diagnose::fit::effort::Effort;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{on_bench, shipped, truth, with_effect};
-    use inference::forward::setting;
+    use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
 
     /// The world is integrated in other steps than the twin's, so its friction is another in the twin.

@@ -3,7 +3,7 @@
 
 use super::bench::{Bench, FittedClip, Hypothesis};
 use super::floor;
-use crate::diagnose::evidence::measured::{Evidence, Measured};
+use inference::likelihood::{Evidence, Likelihood};
 use twin::effects::Search;
 
 /// What a number may change of the clips' squared residuals, as a share and at least, and still be one that nothing depends
@@ -23,7 +23,7 @@ pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hy
 }
 
 /// The sizes of an effect on the arm that nothing depends on.
-pub fn sizes<E: Measured>(bench: &Bench<'_, E>, hypothesis: &Hypothesis<E::Own>, effect: usize) -> Vec<usize> {
+pub fn sizes<E: Likelihood>(bench: &Bench<'_, E>, hypothesis: &Hypothesis<E::Own>, effect: usize) -> Vec<usize> {
     let candidate = &bench.library.candidates[effect];
     // Of one number it is known that something depends on it: it was found.
     if !candidate.is_of_arm() || candidate.sizes.len() < 2 {
@@ -73,7 +73,7 @@ mod tests {
     use crate::benchmark::world::{Kind, World};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
-    use inference::forward::setting;
+    use inference::likelihood::setting;
     use shared_mem::theta::Theta;
     use twin::arm::MAX_JOINTS;
 

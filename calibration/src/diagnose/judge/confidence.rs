@@ -75,8 +75,8 @@ mod tests {
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::fit::sweep::Reduced;
     use crate::diagnose::test_bench::shipped;
-    use inference::forward::random_effects_scale::Around;
-    use inference::forward::setting;
+    use inference::likelihood::random_effects_scale::Around;
+    use inference::likelihood::setting;
     use nalgebra::DMatrix;
     use shared_mem::msg::MAX_JOINTS;
     use std::marker::PhantomData;

@@ -10,8 +10,8 @@ use super::remainder::{self, Left};
 use super::score::{Advantage, predict_unseen};
 use super::trial::CLOSES;
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::evidence::measured::{Evidence, Group};
 use crate::diagnose::fit::bench::Bench;
+use inference::likelihood::{Evidence, Group};
 
 /// What they say.
 pub(in crate::diagnose) struct Confirmation {

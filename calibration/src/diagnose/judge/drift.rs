@@ -5,8 +5,8 @@
 //! leads further than clips scatter.
 
 use crate::diagnose::fit::bench::Hypothesis;
-use inference::forward::object::Nuisance;
-use inference::forward::random_effects::RandomEffects;
+use inference::likelihood::object::Nuisance;
+use inference::likelihood::random_effects::RandomEffects;
 use inference::statistics::student_sigmas;
 
 /// A slope of so many sigmas of a normal distribution, or as unlikely a one of few clips, is no chance: p = 0.02.

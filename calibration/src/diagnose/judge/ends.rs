@@ -2,7 +2,7 @@
 //! is at least as strong, or something else.
 
 use crate::diagnose::library::Library;
-use inference::forward::setting::Setting;
+use inference::likelihood::setting::Setting;
 use std::collections::BTreeMap;
 
 /// A size nearer to an end of its search than this share of its range stopped there.
@@ -33,7 +33,7 @@ pub(crate) fn stopped(library: &Library, candidate: usize, full: &[f64]) -> Vec<
 mod tests {
     use super::*;
     use crate::diagnose::test_bench::shipped;
-    use inference::forward::setting;
+    use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
 
     #[test]

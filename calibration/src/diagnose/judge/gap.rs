@@ -1,8 +1,8 @@
 //! The gap: mean square of residuals in sigmas of the sensors, and by how much it shrinks from one hypothesis to another.
 
 use crate::diagnose::answer::Share;
-use crate::diagnose::evidence::measured::{Evidence, Group};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use inference::likelihood::{Evidence, Group};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -202,7 +202,7 @@ mod tests {
     use crate::benchmark::world::Kind;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
-    use inference::forward::setting;
+    use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
 
     fn residuals(sizes: &[f64]) -> Residuals {

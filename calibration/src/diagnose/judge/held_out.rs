@@ -3,11 +3,11 @@
 
 use super::gap::Residuals;
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::left_out::numbers_without;
 use crate::diagnose::fit::sweep::Precision;
+use inference::likelihood::Evidence;
 
 /// Enough for a fit that begins where all clips together have it.
 const EFFORT: Effort = Effort::of(8, Precision::Joints);
@@ -64,7 +64,7 @@ mod tests {
     use crate::benchmark::world::Kind;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
-    use inference::forward::setting;
+    use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::gap::Residuals;
 use crate::diagnose::answer::Place;
-use crate::diagnose::evidence::measured::{Evidence, Group};
+use inference::likelihood::{Evidence, Group};
 use std::collections::BTreeMap;
 
 /// Cells with less than this share are left out.

@@ -15,8 +15,8 @@ use super::trial::{Found, Step};
 use super::{confidence, remainder};
 use crate::diagnose::answer::Share;
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Bench;
+use inference::likelihood::Evidence;
 
 /// More than half of the squared gap: then what was found is larger than all that was not.
 const REAL_SHARE: f64 = 0.5;
@@ -124,7 +124,7 @@ mod tests {
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
-    use inference::forward::setting;
+    use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
 
     fn likelier(nats: f64) -> Predicted {

@@ -97,7 +97,7 @@ mod tests {
     use crate::benchmark::session::record;
     use crate::benchmark::world::{Kind, World};
     use crate::diagnose::test_bench::{shipped, with_effect};
-    use inference::forward::setting;
+    use inference::likelihood::setting;
 
     /// The test of strokes in a world under what the laboratory knows, with the true gains and object.
     fn of(world: &World) -> StageTest {

@@ -10,9 +10,9 @@ use crate::diagnose::criteria::{
     DOUBTFUL, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, OBJECT_EXCESS,
     OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, PLAIN_IN_JOINTS, PLAIN_IN_OBJECT, TURNS_WITHIN,
 };
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
+use inference::likelihood::Evidence;
 use twin::effects::Role;
 
 /// A cause that stands out clearly may leave this share of the object's gap: after a bouncing hit no two engines agree. What

@@ -5,11 +5,11 @@
 //! than it costs at the joint fit, it is simulated: a hit is not linear for long.
 
 use super::held_out::Fits;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
 use crate::diagnose::fit::left_out::shift_to;
 use crate::diagnose::fit::quadratic::value;
-use inference::forward::random_effects_scale::{Around, at_the_best_scale};
+use inference::likelihood::Evidence;
+use inference::likelihood::random_effects_scale::{Around, at_the_best_scale};
 use inference::statistics::median;
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.

@@ -7,11 +7,11 @@ use super::tolerance::{self, Measured};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::answer::{Change, Gap, SensorGap, TorqueRms};
 use crate::diagnose::clips::admit::Admitted;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Bench;
 use crate::page::in_unit;
-use inference::forward::object::Replays;
-use inference::forward::setting;
+use inference::likelihood::Evidence;
+use inference::likelihood::object::Replays;
+use inference::likelihood::setting;
 use shared_mem::cell::Tolerance;
 use shared_mem::recording::Session;
 

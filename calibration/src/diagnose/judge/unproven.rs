@@ -2,8 +2,8 @@
 //! clips would prove.
 
 use super::trial::{Found, PLAIN, Trial, convincing};
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use inference::likelihood::Evidence;
 
 /// An effect that is likely, and not proven.
 pub(in crate::diagnose) struct Unproven<'a> {

@@ -7,13 +7,13 @@
 //! but the stiffness follows by linear least squares. The stiffness hardly shows there, since slow motion tells ratios alone; it is
 //! taken where the simulated clips cost least, each joint by itself.
 
-use crate::diagnose::evidence::measured::Measured;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::known_gains;
 use crate::diagnose::library::{Candidate, Library};
 use inference::estimate::Unknown;
-use inference::forward::Setting;
-use inference::forward::arm::following::Moment;
+use inference::likelihood::Likelihood;
+use inference::likelihood::Setting;
+use inference::likelihood::arm::following::Moment;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -34,7 +34,7 @@ const TURNS: usize = 15;
 const FAR: f64 = 2.385;
 
 /// Numbers at which the fit of a candidate begins; `None` where it is no dry friction, the gains are known, or the law is another.
-pub(in crate::diagnose) fn start<E: Measured>(
+pub(in crate::diagnose) fn start<E: Likelihood>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
@@ -69,7 +69,7 @@ pub(in crate::diagnose) fn start<E: Measured>(
 
 /// The numbers, with what the candidate holds while it is searched at its lower end where that costs less: a joint that creeps
 /// leaves within seconds what one that sticks keeps.
-fn sticking<E: Measured>(
+fn sticking<E: Likelihood>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
@@ -83,7 +83,7 @@ fn sticking<E: Measured>(
 }
 
 /// What the clips of a hypothesis cost in the channels of each joint at other numbers.
-fn of_joints<E: Measured>(
+fn of_joints<E: Likelihood>(
     bench: &Bench<'_, E>,
     from: &Hypothesis<E::Own>,
     (full, weights): (&[f64], &[f64]),
@@ -240,7 +240,7 @@ mod tests {
     use super::*;
     use crate::benchmark::world::{Fault, Kind, World};
     use crate::diagnose::test_bench::{ONCE, on_bench};
-    use inference::forward::setting;
+    use inference::likelihood::setting;
     use shared_mem::cell::Cell;
     use shared_mem::msg::MAX_JOINTS;
     use shared_mem::theta::{ArmTheta, Theta};

@@ -5,15 +5,15 @@
 use super::screening::arm_gap_is_open;
 use super::starts;
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::{Channel, Evidence, Measured, Near, Reach, Row};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
 use crate::diagnose::fit::{stages, undetermined};
 use crate::diagnose::judge::trial::Step;
 use crate::page::words;
 use inference::estimate::{ClipModel, Impossible};
-use inference::forward::arm::following::Moment;
-use inference::forward::random_effects::{RandomEffects, WithoutOwn};
+use inference::likelihood::arm::following::Moment;
+use inference::likelihood::random_effects::{RandomEffects, WithoutOwn};
+use inference::likelihood::{Channel, Evidence, Likelihood, Near, Reach, Row};
 use shared_mem::progress::Progress;
 
 /// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there.
@@ -105,7 +105,7 @@ impl<E: Evidence> ClipModel for ArmAlone<'_, E> {
     }
 }
 
-impl<E: Evidence> Measured for ArmAlone<'_, E> {
+impl<E: Evidence> Likelihood for ArmAlone<'_, E> {
     type Own = WithoutOwn;
 
     fn changed(
@@ -150,7 +150,6 @@ impl<E: Evidence> Measured for ArmAlone<'_, E> {
 mod tests {
     use super::*;
     use crate::benchmark::world::{Fault, Kind, World};
-    use crate::diagnose::evidence::measured::Group;
     use crate::diagnose::fit::effort::Effort;
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::judge::gap::Typical;
@@ -158,6 +157,7 @@ mod tests {
     use crate::diagnose::judge::trial::Trial;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
+    use inference::likelihood::Group;
 
     /// The baseline as it is hidden in a world.
     fn hidden_baseline(library: &Library, world: &World) -> Vec<f64> {

@@ -4,8 +4,8 @@
 //! slope leads from one to the other. So all orders are tried in steps that a fit can bridge, every joint by itself (a
 //! periodogram over the position instead of over time, by least squares: Lomb 1976).
 
-use crate::diagnose::evidence::measured::{Measured, Reach};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use inference::likelihood::{Likelihood, Reach};
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
@@ -35,7 +35,7 @@ impl Waves {
 
 /// Numbers with the candidate's ripple at the order, strength and phase that suit each joint best; `None` where the twin has
 /// no answer. `from`: what acts already, and the clips.
-pub(in crate::diagnose) fn start<E: Measured>(
+pub(in crate::diagnose) fn start<E: Likelihood>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis<E::Own>, &[f64]),
     candidate: usize,
@@ -101,7 +101,7 @@ mod tests {
     use crate::benchmark::world::{Fault, Kind, World};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped};
-    use inference::forward::setting;
+    use inference::likelihood::setting;
     use shared_mem::theta::{EffectTheta, Theta};
 
     #[test]

@@ -1,12 +1,12 @@
 //! Which candidates are worth a fit.
 
 use crate::diagnose::criteria::OBJECT_EXCESS;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::{BY_CHANCE, Scored, TESTABLE};
 use crate::diagnose::judge::gap::Typical;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::trial::Step;
+use inference::likelihood::Evidence;
 use twin::effects::Stage;
 
 /// So many candidates are fitted at each step.

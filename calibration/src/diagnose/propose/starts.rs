@@ -3,11 +3,11 @@
 //! does nothing below a threshold, joint by joint.
 
 use super::{along_motion, ripple};
-use crate::diagnose::evidence::measured::Measured;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
-use inference::forward::Setting;
+use inference::likelihood::Likelihood;
+use inference::likelihood::Setting;
 use twin::effects::{Search, Stage};
 
 /// Other starts of a fit are this share of the strongest that is met in practice away.
@@ -38,7 +38,7 @@ const BY_JOINT: [f64; 4] = [0.1, 0.3, 1.0, 3.0];
 const ALL_ALONG: [f64; 10] = [-9.0, -7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0, 9.0];
 
 /// [`of`], worked out unless it is known.
-pub(in crate::diagnose) fn kept<E: Measured>(
+pub(in crate::diagnose) fn kept<E: Likelihood>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis<E::Own>, &[f64]),
     scored: &Scored,
@@ -49,7 +49,7 @@ pub(in crate::diagnose) fn kept<E: Measured>(
 }
 
 /// Numbers at which fits of a candidate begin; `overlooked`: the score test did not point to it.
-fn of<E: Measured>(
+fn of<E: Likelihood>(
     bench: &Bench<'_, E>,
     at: (&Hypothesis<E::Own>, &[f64]),
     scored: &Scored,
@@ -62,7 +62,11 @@ fn of<E: Measured>(
 /// table) also the forms next to the best; of one beyond the arm also some way to either side, since the object's numbers,
 /// fitted without it, stand in for a part of it; of one whose slope at one point tells little, as where the object is hit
 /// elsewhere, also where the clips cost least.
-fn pointed_at<E: Measured>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
+fn pointed_at<E: Likelihood>(
+    bench: &Bench<'_, E>,
+    at: (&Hypothesis<E::Own>, &[f64]),
+    scored: &Scored,
+) -> Vec<Vec<f64>> {
     let candidate = &bench.library.candidates[scored.candidate];
     let mut starts = vec![scored.clone()];
     if candidate.effect.stage == Stage::Slide {
@@ -101,7 +105,7 @@ pub(in crate::diagnose) fn has_places<E>(bench: &Bench<'_, E>, candidate: usize)
 
 /// Where the clips cost least with a candidate in each of its many forms, friction being another beside it: an edge that lies
 /// elsewhere than it is shows no slope towards its place.
-fn placed<E: Measured>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
+fn placed<E: Likelihood>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let friction = bench.library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
     let mut places: Vec<(f64, Vec<f64>)> = Vec::new();
@@ -124,7 +128,7 @@ fn placed<E: Measured>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]), 
 
 /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least, in any form, unless
 /// they cost far more than without it.
-fn scanned<E: Measured>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
+fn scanned<E: Likelihood>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]), scored: &Scored) -> Vec<Vec<f64>> {
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
     let starts = forms.flat_map(|alternative| aside(bench, &Scored { alternative, ..scored.clone() }, &SCANNED));
     let numbers = starts.map(|start| bench.begun(at.0.full.clone(), &start));
@@ -137,7 +141,7 @@ fn scanned<E: Measured>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]),
 }
 
 /// Numbers of an effect to which no slope leads, joint by joint.
-fn without_a_slope<E: Measured>(
+fn without_a_slope<E: Likelihood>(
     bench: &Bench<'_, E>,
     at: (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
@@ -153,7 +157,7 @@ fn without_a_slope<E: Measured>(
 
 /// Limits of joints, each time that of the joint where the clips then cost least, for as long as that spares something: until the
 /// worst is limited, those of the others mean nothing.
-fn limits<E: Measured>(
+fn limits<E: Likelihood>(
     bench: &Bench<'_, E>,
     at: (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
@@ -185,7 +189,7 @@ fn limits<E: Measured>(
 
 /// Sizes of an effect in the joints, one joint after the other, where the clips cost least once the gains of that joint are fitted
 /// beside it: gains that were fitted without the effect stand in for it.
-fn joint_by_joint<E: Measured>(
+fn joint_by_joint<E: Likelihood>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis<E::Own>, &[f64]),
     candidate: &Candidate,
@@ -215,12 +219,12 @@ fn joint_by_joint<E: Measured>(
 
 /// The numbers with gains as cell.toml has them: where an arm is driven into its limits, gains that were fitted without these mean
 /// nothing.
-fn with_nominal_arm<E: Measured>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
+fn with_nominal_arm<E: Likelihood>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
     with_nominal(bench, full, |k| bench.library.joints[k].is_some())
 }
 
 /// The numbers with some of the baseline's as cell.toml has them.
-fn with_nominal<E: Measured>(bench: &Bench<'_, E>, mut full: Vec<f64>, which: impl Fn(usize) -> bool) -> Vec<f64> {
+fn with_nominal<E: Likelihood>(bench: &Bench<'_, E>, mut full: Vec<f64>, which: impl Fn(usize) -> bool) -> Vec<f64> {
     bench.library.baseline.clone().filter(|k| which(*k)).for_each(|k| full[k] = bench.library.unknowns[k].start);
     full
 }
@@ -228,7 +232,7 @@ fn with_nominal<E: Measured>(bench: &Bench<'_, E>, mut full: Vec<f64>, which: im
 /// Some way to either side along each of a candidate's directions, in any of its forms: what the clips cost where they cost
 /// least, and the numbers there. Also with the object as it is said to be: fitted without the effect, its numbers stand in
 /// for it, and would have to be unlearnt.
-pub(in crate::diagnose) fn least_cost_aside<E: Measured>(
+pub(in crate::diagnose) fn least_cost_aside<E: Likelihood>(
     bench: &Bench<'_, E>,
     at: (&Hypothesis<E::Own>, &[f64]),
     scored: &Scored,
@@ -253,7 +257,7 @@ pub(in crate::diagnose) fn least_cost_aside<E: Measured>(
 
 /// Numbers of an effect in the joints that the arm's own channels leave open, where the object tells them: nothing but what
 /// the tip hits says how far off a vertical joint's encoder is. `full`: the others, as the arm tells them.
-pub(in crate::diagnose) fn seen_by_the_object<E: Measured>(
+pub(in crate::diagnose) fn seen_by_the_object<E: Likelihood>(
     bench: &Bench<'_, E>,
     at: (&Hypothesis<E::Own>, &[f64]),
     full: Vec<f64>,
@@ -264,7 +268,7 @@ pub(in crate::diagnose) fn seen_by_the_object<E: Measured>(
 
 /// Numbers of a candidate, one after the other, where the clips cost least beside those before it: from rest no slope leads
 /// there. `units` of each number's probe are tried, and rest.
-fn one_by_one<E: Measured>(
+fn one_by_one<E: Likelihood>(
     bench: &Bench<'_, E>,
     at: (&Hypothesis<E::Own>, &[f64]),
     mut full: Vec<f64>,
@@ -287,14 +291,14 @@ fn one_by_one<E: Measured>(
 
 /// The numbers with the baseline's object as cell.toml has it, but for its friction: how far it slides tells that whatever
 /// the hit was like.
-fn with_nominal_object<E: Measured>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
+fn with_nominal_object<E: Likelihood>(bench: &Bench<'_, E>, full: Vec<f64>) -> Vec<f64> {
     let (library, at) = (bench.library, full.clone());
     with_nominal(bench, full, |k| !library.arm_feels(k, &at) && library.settings.settings()[k] != Setting::Friction)
 }
 
 /// Which numbers make the fitted clips cost least, and how much, where that is less than `bound`. Of numbers that cost more
 /// before all clips were asked the others are not.
-fn cheapest_below<E: Measured>(
+fn cheapest_below<E: Likelihood>(
     bench: &Bench<'_, E>,
     (from, weights): (&Hypothesis<E::Own>, &[f64]),
     numbers: impl Iterator<Item = Vec<f64>>,
@@ -314,7 +318,7 @@ fn cheapest_below<E: Measured>(
 }
 
 /// The same whatever they cost.
-fn cheapest<E: Measured>(
+fn cheapest<E: Likelihood>(
     bench: &Bench<'_, E>,
     at: (&Hypothesis<E::Own>, &[f64]),
     numbers: impl Iterator<Item = Vec<f64>>,
@@ -323,7 +327,7 @@ fn cheapest<E: Measured>(
 }
 
 /// A candidate at shares of the strongest that is met in practice, either way where it acts both ways.
-fn aside<E: Measured>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> Vec<Scored> {
+fn aside<E: Likelihood>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -> Vec<Scored> {
     let probes = &bench.library.candidates[scored.candidate].alternatives[scored.alternative].probes;
     let one_sided = probes.iter().any(|probe| probe.one_sided);
     let sides = shares.iter().flat_map(|share| [*share, -share]).filter(|side| *side > 0.0 || !one_sided);
@@ -336,10 +340,10 @@ mod tests {
     use super::*;
     use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
-    use crate::diagnose::evidence::arm_clips::ArmClips;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, on_strokes, shipped, with_effect};
-    use inference::forward::setting;
+    use inference::likelihood::arm::ArmClips;
+    use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
     use shared_mem::theta::{EffectTheta, Theta};
 

@@ -6,13 +6,13 @@
 
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::{Evidence, Measured};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::sweep::Precision;
 use crate::diagnose::fit::{floor, stages};
 use crate::diagnose::propose::arm_alone::ArmAlone;
 use crate::identify::{arm, object};
+use inference::likelihood::{Evidence, Likelihood};
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
@@ -55,7 +55,7 @@ pub fn identify<E: Evidence>(
 }
 
 /// The arm by itself, from where its numbers begin.
-fn of_the_arm<E: Measured>(
+fn of_the_arm<E: Likelihood>(
     bench: &Bench<'_, E>,
     split: &Split,
     start: Vec<f64>,

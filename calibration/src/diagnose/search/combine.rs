@@ -5,7 +5,6 @@ use super::by_engine::by_engine;
 use super::refit::{last_pass, refitted, without_superfluous};
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
-use crate::diagnose::evidence::measured::{Evidence, Group, Row};
 use crate::diagnose::fit::anchored::Anchored;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, NEAR};
@@ -21,6 +20,7 @@ use crate::diagnose::propose::screening::{arm_gap_is_open, overlooked, seen_at_t
 use crate::diagnose::propose::signatures;
 use crate::diagnose::propose::starts;
 use crate::page::words;
+use inference::likelihood::{Evidence, Group, Row};
 use shared_mem::progress::Progress;
 
 /// At most so many effects are named.

@@ -4,10 +4,10 @@
 //! with one, which each get a start of their own; any effect then seems to close what that place leaves.
 
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, NEAR};
 use crate::diagnose::judge::trial::{CLOSES, Step};
+use inference::likelihood::Evidence;
 
 impl Step {
     /// What this step extends, from the numbers of its best trial without that trial's effect, where it fits better by more

@@ -2,11 +2,11 @@
 //! stand in for a part of it.
 
 use crate::diagnose::clips::split::Split;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::FIRST_PASS;
 use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::trial::{LEAST, PLAIN, Step, Trial};
+use inference::likelihood::Evidence;
 
 /// Rivals of the best that are worth this share of it are fitted again.
 const RIVAL: f64 = 0.5;

@@ -6,7 +6,7 @@ use super::finding::Finding;
 use super::session::Used;
 use crate::identify::answer::{Figures, Identification};
 use inference::estimate::{ClipFit, Fit};
-use inference::forward::Setting;
+use inference::likelihood::Setting;
 use nalgebra::DMatrix;
 use twin::effects::{Parameter, Search, registry};
 

@@ -3,7 +3,7 @@
 use crate::identify::answer::{Identification, Parameter};
 use crate::identify::run::Outcome;
 use inference::estimate::{Intervals, Unknown, at_bounds};
-use inference::forward::Settings;
+use inference::likelihood::Settings;
 use std::collections::BTreeMap;
 
 /// Everything that a fit tells.

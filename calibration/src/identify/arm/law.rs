@@ -3,10 +3,10 @@
 
 use super::{ArmError, Numbers, begun};
 use inference::estimate::{ClipModel as _, Options as FitOptions, fit};
-use inference::forward::Settings;
-use inference::forward::arm::ArmClips;
-use inference::forward::setting::{arm_numbers, complete};
 use inference::interrupt::Interrupt;
+use inference::likelihood::Settings;
+use inference::likelihood::arm::ArmClips;
+use inference::likelihood::setting::{arm_numbers, complete};
 use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;

@@ -5,8 +5,8 @@ use super::Model;
 use super::session::joint_of;
 use super::start::costs;
 use inference::estimate::{ClipModel, Fit, Options, Subset, Unknown, fit};
-use inference::forward::Setting;
 use inference::interrupt::Interrupt;
+use inference::likelihood::Setting;
 use rayon::prelude::*;
 use twin::effects::Search;
 

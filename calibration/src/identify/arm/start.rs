@@ -4,8 +4,8 @@
 use super::Model;
 use super::session::joint_of;
 use inference::estimate::{ClipModel as _, Unknown};
-use inference::forward::Setting;
 use inference::interrupt::Interrupt;
+use inference::likelihood::{Likelihood as _, Setting};
 use rayon::prelude::*;
 use shared_mem::cell::Cell;
 use shared_mem::msg::{Joints, MAX_JOINTS};

@@ -58,9 +58,9 @@ mod tests {
     use crate::benchmark::world::{Fault, Kind, World};
     use crate::identify::arm::Numbers;
     use inference::estimate::{Options, fit};
-    use inference::forward::Settings;
-    use inference::forward::arm::ArmClips;
-    use inference::forward::setting::{arm_numbers, complete};
+    use inference::likelihood::Settings;
+    use inference::likelihood::arm::ArmClips;
+    use inference::likelihood::setting::{arm_numbers, complete};
     use shared_mem::cell::Cell;
     use std::path::Path;
 

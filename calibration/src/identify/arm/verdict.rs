@@ -6,7 +6,7 @@ use super::session::{Used, joint_of};
 use crate::identify::answer::Untold;
 use crate::identify::run::Optimizer;
 use crate::page::number_in_words;
-use inference::forward::Setting;
+use inference::likelihood::Setting;
 use twin::effects::{Robot, find};
 
 /// A gain whose 95 % interval is wider than this share of it, to either side, is not told.

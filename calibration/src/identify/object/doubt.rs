@@ -1,7 +1,7 @@
 //! What speaks against trusting a fit although it looks sure of itself, one sentence each with the remedy.
 
 use crate::identify::answer::{ClipGap, Identification};
-use inference::forward::object::noise_of;
+use inference::likelihood::object::noise_of;
 use shared_mem::cell::Cell;
 
 /// ADD on the clips fitted, over the tracker's noise, from which on it is neither noise nor chance in the hits.

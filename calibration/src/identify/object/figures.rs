@@ -5,7 +5,7 @@ use super::material::Material;
 use crate::identify::answer::{ClipGap, Figures, Identification};
 use crate::page::Trace;
 use inference::engine::Engine;
-use inference::forward::object::Replays;
+use inference::likelihood::object::Replays;
 use rayon::prelude::*;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;

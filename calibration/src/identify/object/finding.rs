@@ -5,7 +5,7 @@ use super::material::Material;
 use crate::identify::answer::{Advice, Identification, Parameter, Untold};
 use crate::page::number_in_words;
 use inference::estimate::{Fit, Intervals, Unknown};
-use inference::forward::{Setting, Settings};
+use inference::likelihood::{Setting, Settings};
 use std::collections::BTreeMap;
 
 /// An interval wider than this share of the search's range, to either side, tells nothing.

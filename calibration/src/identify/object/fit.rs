@@ -9,8 +9,8 @@
 use super::step::{Linearised, Question};
 use super::vicinity::points;
 use inference::estimate::{ClipModel as _, Impossible, Random, Unknown};
-use inference::forward::object::{Channel, ModelError, ObjectClips, Part};
 use inference::kept::{Fingerprint, Kept, Trail};
+use inference::likelihood::object::{Channel, ModelError, ObjectClips, Part};
 use rayon::prelude::*;
 use shared_mem::cell::PoseNoise;
 

@@ -5,7 +5,7 @@ use super::{ObjectError, Options};
 use crate::identify::answer::{Clips, LeftOut};
 use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
-use inference::forward::arm::one_piece;
+use inference::likelihood::arm::one_piece;
 use rayon::prelude::*;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::console;

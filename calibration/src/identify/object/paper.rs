@@ -3,7 +3,7 @@
 //! Every pose is one residual whose square is its loss, so that whatever searches by sums of squares searches by this.
 
 use inference::estimate::{ClipModel, Impossible};
-use inference::forward::object::ObjectClips;
+use inference::likelihood::object::ObjectClips;
 use nalgebra::{Isometry3, Vector6};
 use shared_mem::frames::{Base, Object, Pose};
 use twin::metrics::SurfacePoints;

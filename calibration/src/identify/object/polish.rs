@@ -5,16 +5,16 @@
 //! they tell how high the centre of mass lies but by how the object tips, which is not as in the twin ([`ModelError::flat`]):
 //! the height stays what the way along the table tells.
 //!
-//! [`ModelError::flat`]: inference::forward::object::ModelError::flat
+//! [`ModelError::flat`]: inference::likelihood::object::ModelError::flat
 
 use super::fit::{ObjectFit, fit_object, linearise_object, roughly};
 use super::paper::SurfaceLoss;
 use super::step::Linearised;
 use super::vicinity::descend;
 use inference::estimate::{ClipModel as _, Impossible, Unknown};
-use inference::forward::Setting;
-use inference::forward::object::ObjectClips;
 use inference::kept::{Kept, Trail};
+use inference::likelihood::Setting;
+use inference::likelihood::object::ObjectClips;
 use nalgebra::{DMatrix, DVector};
 use shared_mem::cell::ClipKind;
 use twin::scene::ObjectShape;

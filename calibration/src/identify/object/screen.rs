@@ -3,7 +3,7 @@
 
 use super::mend::mended;
 use super::odd::{oddities, rate};
-use inference::forward::object::Clearance;
+use inference::likelihood::object::Clearance;
 use nalgebra::Vector3;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ObjectSeries};

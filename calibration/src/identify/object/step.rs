@@ -8,7 +8,7 @@ use inference::estimate::{
     ClipFit, ClipModel, Descent, Fit, Impossible, Intervals, Options, Random, Unknown, at_bounds, fit_from,
     without_leaning,
 };
-use inference::forward::object::ObjectClips;
+use inference::likelihood::object::ObjectClips;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 
 use super::clip::{ArmClip, Run, desired_rows};
 use super::is_tracking;
-use crate::forward::object;
+use crate::likelihood::object;
 use shared_mem::cell::Cell;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::Clip;

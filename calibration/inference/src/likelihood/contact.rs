@@ -10,9 +10,9 @@
 //! its friction; how much, rigid bodies leave open, and two engines differ there by ten and more times the encoders' noise in
 //! strokes whose objects go the same way (`tests/peers/README.md`). So the direction in which a vertical force at the tip turns the joints, `K_P^-1 J_z'`, is taken out.
 
-use super::arm_clips::ArmClips;
-use super::measured::{Row, StageName};
-use inference::forward::object::{self, ObjectClips};
+use super::arm::ArmClips;
+use super::object::{self, ObjectClips};
+use super::{Row, StageName};
 use nalgebra::DVector;
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
@@ -79,25 +79,8 @@ impl Contact {
 
 #[cfg(test)]
 mod tests {
-    use super::super::measured::{Evidence, Group};
-    use super::Contact;
-    use crate::benchmark::world::{Fault, Kind, World};
-    use crate::diagnose::fit::bench::Bench;
-    use crate::diagnose::fit::sweep::Precision;
-    use crate::diagnose::test_bench::{on_strokes, shipped};
+    use super::*;
     use twin::arm::MAX_JOINTS;
-
-    /// The largest slope in a group of a number of the baseline, by its name [sigma for 1 % of it].
-    fn slope<E: Evidence>(bench: &Bench<'_, E>, name: &str, group: Group) -> f64 {
-        let k = bench.library.settings.settings().iter().position(|setting| setting.name() == name);
-        let k = k.expect("a number of that name");
-        let (numbers, clips) = (bench.library.start(), [(0, vec![0.0; bench.scatter.count()])]);
-        let swept = bench.linearise(&numbers, &[k], &clips, Precision::Exact).expect("a stroke");
-        let slopes = swept.clips[0].matrix.column(1);
-        let rows = bench.evidence.rows(0).iter().zip(slopes.iter());
-        let of_group = rows.filter(|(row, _)| bench.evidence.channels()[row.channel].group == group);
-        of_group.fold(0.0, |largest: f64, (_, slope)| largest.max((0.01 * numbers[k] * slope).abs()))
-    }
 
     #[test]
     fn a_vertical_force_leaves_no_residual_and_a_horizontal_one_does() {
@@ -111,18 +94,5 @@ mod tests {
         assert!(left([0.4, 0.1, 0.05]) > 100.0);
         let limp = contact.in_sigmas(&[4e-6, 8e-6, 8e-6], &[0.0; 3]);
         assert!(limp.iter().zip([1.0, 2.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{limp:?}");
-    }
-
-    #[test]
-    fn the_joints_in_contact_tell_how_heavy_the_object_is_and_nothing_about_gains() {
-        let cell = shipped();
-        let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
-        on_strokes((&cell, &world), |bench, _| {
-            let in_contact = slope(bench, "mass", Group::Contact);
-            assert!(in_contact > 3.0 && in_contact > slope(bench, "mass", Group::Object), "{in_contact}");
-            assert_eq!(slope(bench, "mass", Group::Arm), 0.0);
-            assert_eq!(slope(bench, "stiffness[1]", Group::Contact), 0.0);
-            assert!(slope(bench, "stiffness[1]", Group::Arm) > 1.0);
-        });
     }
 }

@@ -2,7 +2,7 @@
 //! of motion along the measured motion (equation error; Khalil and Dombre 2002, "Modeling, Identification and Control of Robots",
 //! chapter 12). Nothing is simulated, so that none of it depends on a parameter that is searched.
 
-use crate::forward::smoothing;
+use crate::likelihood::smoothing;
 use shared_mem::cell::ControllerKind;
 use shared_mem::recording::JointSeries;
 use twin::arm::{ArmModel, JointState, Joints, MAX_JOINTS};
@@ -21,7 +21,7 @@ pub struct Moment {
 }
 
 /// Moments of a clip at stamps [ns]; `None` where the law is no spring to the command with a damper to the ground, or the clip is too
-/// short to be smoothed. A damper that is told the desired velocity imitates no friction.
+/// short to be smoothed. A damper that gets the desired velocity imitates no friction.
 pub fn moments(
     (model, law): (&ArmModel, ControllerKind),
     (measured, commands): (&JointSeries, &CommandTrack),

@@ -32,7 +32,7 @@ pub struct RandomEffects {
     pub random: Vec<Random>,
     /// Those of them whose scatter has heavy tails, as one vector.
     pub heavy: Range<usize>,
-    /// Which clips count as having gone their own way is told by sigmas so many times as wide.
+    /// Which clips are outliers is decided by sigmas so many times as wide [1].
     pub forgiving: f64,
 }
 

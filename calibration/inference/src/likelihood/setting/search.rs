@@ -64,7 +64,7 @@ impl Gain<'_> {
     }
 }
 
-/// Ranges of the object's parameters where cell.toml tells none: friction, mass over the nominal one, friction of the tip.
+/// Ranges of the object's parameters where cell.toml states none: friction, mass over the nominal one, friction of the tip.
 const FRICTION: Range = [0.02, 1.5];
 const MASS_FACTOR: f64 = 5.0;
 const TIP_FRICTION: Range = [0.0, 1.0];
@@ -109,9 +109,9 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
     all
 }
 
-/// How far beyond what is met in practice an effect is searched, over the width of that range.
+/// How far beyond what is plausible an effect is searched, over the width of that range.
 const WIDENED: f64 = 0.5;
-/// Difference step over the width of what is met in practice.
+/// Difference step over the width of what is plausible.
 const EFFECT_STEP: f64 = 2e-3;
 /// The same where hits lie between the number and what is seen, of a tool or of a gear's flanks: over this step their
 /// roughness averages out.
@@ -148,7 +148,7 @@ pub fn effect_settings(info: &'static EffectInfo, robot: &Robot, dof: usize) -> 
     all
 }
 
-/// The range of the number that is turned; `met`: values of the parameter that are met in practice.
+/// The range of the number that is turned; `met`: plausible values of the parameter.
 fn searched(parameter: &Parameter, met: Range, inverse: bool) -> Range {
     let [lo, hi] = met;
     if inverse {

@@ -1,4 +1,4 @@
-//! A clip by another program ([`crate::engine`]) in place of the twin. As with an arm alone ([`crate::forward::motion`]) the nominal
+//! A clip by another program ([`crate::engine`]) in place of the twin. As with an arm alone ([`crate::likelihood::motion`]) the nominal
 //! cell is the engine's, and what it does not know is added as the twin's own difference:
 //!
 //! ```text
@@ -17,7 +17,7 @@ use super::outcome::{Outcome, Path};
 use super::rollout::{Job, impossible};
 use crate::engine::{Engine, ObjectBody, ObjectQuestion, POSE, Quantity, Question};
 use crate::estimate::Impossible;
-use crate::forward::motion::{commands, states};
+use crate::likelihood::motion::{commands, states};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use shared_mem::cell::Cell;
 use shared_mem::frames::Pose;

@@ -30,8 +30,10 @@ pub use clip::{ArmClip, ArmClipError};
 pub use piece::one_piece;
 
 use super::motion::Mover;
+use super::random_effects::{RandomEffects, WithOwn};
 use super::recent::Recent;
 use super::rows::{Channel, Group, Row};
+use super::{Likelihood, Near};
 use crate::engine::{Engine, Quantity};
 use crate::estimate::{ClipModel, Impossible, Random};
 use following::Moment;
@@ -175,16 +177,6 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         self
     }
 
-    /// Whether another program is the mover.
-    pub fn is_moved_by_engine(&self) -> bool {
-        self.twin.is_some()
-    }
-
-    /// Whether torques along the measured motion are all that is looked at.
-    pub fn is_of_torques(&self) -> bool {
-        self.channels.iter().all(|channel| channel.quantity == TORQUE)
-    }
-
     /// Lets dead joints follow their commands unseen in the clips in which the others feel them move: then it is a reading
     /// that stands still, and not the joint. `shared`: about right.
     pub fn settle_dead_joints(&mut self, shared: &[f64]) {
@@ -205,7 +197,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         residuals.map_or(f64::INFINITY, |residuals| residuals.iter().map(|residual| residual * residual).sum())
     }
 
-    /// What is a clip's own where means are taken: where the log is too coarse to tell the state in which it begins, that state
+    /// The nuisance parameters of clips of which means are taken: where the log is too coarse to show the state in which it begins, that state
     /// (positions, then velocities, of all joints; otherwise their sigmas are 0), and how old its encoders' readings are.
     pub fn random(&self) -> Vec<Random> {
         let coarse = self.clips.iter().any(|clip| {
@@ -230,11 +222,6 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         &self.nominal
     }
 
-    /// What is looked at.
-    pub fn channels(&self) -> &[Channel] {
-        &self.channels
-    }
-
     /// One sigma of a single value of each channel, in its unit.
     pub fn sigma(&self) -> &[f64] {
         &self.sigma
@@ -245,27 +232,12 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         &self.clips[clip]
     }
 
-    /// What each row of a clip's residuals is about.
-    pub fn rows(&self, clip: usize) -> &[Row] {
-        &self.rows[clip]
-    }
-
     /// By how much a vertical force of 1 N at the tip turns each joint at measured joints [N m].
     pub fn vertical_lever(&self, measured: &[f64]) -> Joints {
         let mut q = [0.0; MAX_JOINTS];
         q[..measured.len()].copy_from_slice(measured);
         let tip = self.nominal.tip(&q).position();
         self.nominal.jacobian(&q, tip).map(|column| column[2])
-    }
-
-    /// Moments of a clip along its measured motion, where the arm's law is a spring to the command and a damper to the ground; none
-    /// elsewhere.
-    pub fn following(&self, clip: usize) -> Vec<Moment> {
-        let Some(controller) = &self.cell.controller else { return Vec::new() };
-        let clip = &self.clips[clip];
-        let stamps: Vec<u64> = clip.rows.iter().map(|row| clip.recorded.measured.stamps_ns[*row]).collect();
-        let logged = (&clip.recorded.measured, &clip.commands);
-        following::moments((&self.nominal, controller.kind), logged, &stamps).unwrap_or_default()
     }
 
     /// Largest torque that the controller asks of each joint in any of the clips, gravity included [N m].
@@ -360,6 +332,52 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for ArmClips<F> {
             Some(*rows)
         });
         if *stretch == 0 { Vec::new() } else { ends.collect() }
+    }
+}
+
+impl<F: Fn(&[f64]) -> Theta + Sync> Likelihood for ArmClips<F> {
+    type Own = WithOwn;
+
+    fn following(&self, clip: usize) -> Vec<Moment> {
+        let Some(controller) = &self.cell.controller else { return Vec::new() };
+        let clip = &self.clips[clip];
+        let stamps: Vec<u64> = clip.rows.iter().map(|row| clip.recorded.measured.stamps_ns[*row]).collect();
+        let logged = (&clip.recorded.measured, &clip.commands);
+        following::moments((&self.nominal, controller.kind), logged, &stamps).unwrap_or_default()
+    }
+
+    fn in_halves(&self, clip: usize, shared: &[f64]) -> Option<Vec<f64>> {
+        // Another simulator has steps of its own.
+        self.twin.is_none().then(|| self.residuals_in(2, (clip, shared, &[])).ok())?
+    }
+
+    fn changed(
+        &self,
+        clip: usize,
+        numbers: (&[f64], &[f64]),
+        (_, base, at): Near<'_>,
+        out: &mut Vec<f64>,
+    ) -> Result<(), Impossible> {
+        match at {
+            Some(at) => self.stepped(clip, numbers, (at, base), out),
+            None => self.residuals(clip, numbers.0, numbers.1, out),
+        }
+    }
+
+    fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    fn rows(&self, clip: usize) -> &[Row] {
+        &self.rows[clip]
+    }
+
+    fn scatter(&self) -> RandomEffects {
+        RandomEffects::default()
+    }
+
+    fn torque_sigma(&self) -> Option<&[f64]> {
+        self.channels.iter().all(|channel| channel.quantity == TORQUE).then_some(&self.sigma[..])
     }
 }
 

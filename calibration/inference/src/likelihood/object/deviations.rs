@@ -34,7 +34,7 @@ const fn deviation(name: &'static str, coordinate: Coordinate, shape: Shape, sig
 
 /// Deviation of a clip's end, one sigma [m, rad]: strokes of another engine deviate from the twin that is given their true parameters by
 /// this at the end of the path in a clip like most. Each stage of a clip is allowed as much; how widely a session's clips scatter is
-/// estimated anyway ([`crate::forward::random_effects_scale`]).
+/// estimated anyway ([`crate::likelihood::random_effects_scale`]).
 const PLACE: f64 = 1e-3;
 const TURN: f64 = 0.012;
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::estimate::{ClipFit, Unknown};
-use crate::forward::smoothing;
+use crate::likelihood::smoothing;
 use shared_mem::cell::{ClipKind, Controller};
 use shared_mem::msg::arm::ArmState;
 use shared_mem::origin::Origins;
@@ -24,7 +24,7 @@ fn cell([q_noise, dq_noise]: [f64; 2]) -> Cell {
     cell
 }
 
-/// What the arm does while its fourth joint is told to swing, for 0.6 s.
+/// What the arm does while its fourth joint is commanded to swing, for 0.6 s.
 fn swung(cell: &Cell, theta: &Theta, torques_end_at_rows: bool) -> Clip {
     let mut twin = SimCell::new(cell, Some(theta)).expect("a cell");
     let mut state = ArmState::default();
@@ -153,7 +153,7 @@ fn residuals_are_in_sigmas_of_the_encoders_however_noisy_these_are() {
 #[test]
 fn slopes_of_rows_are_those_of_central_differences() {
     let cell = cell([0.0; 2]);
-    let nominal = crate::forward::setting::complete(&cell, None).expect("gains").arm.expect("gains");
+    let nominal = crate::likelihood::setting::complete(&cell, None).expect("gains").arm.expect("gains");
     let theta = |shared: &[f64]| {
         let ArmTheta { mut stiffness, damping } = nominal.clone();
         stiffness[3] = shared[0];
@@ -203,7 +203,7 @@ fn along_a_measured_motion_the_torque_is_what_moves_links_and_overcomes_friction
         let theta = Theta { effects, ..Theta::default() };
         let arm = ArmClips::moments(&tracking, std::slice::from_ref(&followed), |_: &[f64]| theta.clone());
         let arm = arm.expect("an arm");
-        assert!(arm.is_of_torques() && arm.channels().len() == DOF);
+        assert!(arm.torque_sigma().is_some() && arm.channels().len() == DOF);
         let rows = arm.rows(0).iter().zip(residuals(&arm, &[])).filter(|(row, _)| row.channel == 3);
         for ((_, residual), measured) in rows.zip(&arm.clips[0].rows) {
             let (rest, dq) = (residual * arm.sigma()[3], followed.measured.dq_row(*measured).expect("velocities")[3]);

@@ -32,11 +32,11 @@ const HISTORY: u64 = 2100;
 /// A part of a clip that is simulated in one go.
 #[derive(Debug, Clone, Copy)]
 pub struct Stretch<'a> {
-    /// What the arm did; it tells where the arm began.
+    /// What the arm did, and from where it began.
     pub measured: &'a JointSeries,
     /// The row at which it begins.
     pub from: usize,
-    /// What the arm was told.
+    /// What the arm was commanded to do.
     pub commands: &'a CommandTrack,
     /// Added to the state in which it begins: positions, then velocities; nothing where it is empty.
     pub ahead: &'a [f64],

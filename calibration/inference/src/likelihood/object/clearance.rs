@@ -1,4 +1,4 @@
-//! How far tool and object are apart, told from encoders and tracked poses alone: no simulation, no parameters.
+//! How far tool and object are apart, estimated from encoders and tracked poses alone: no simulation, no parameters.
 
 use nalgebra::Vector3;
 use shared_mem::cell::{Cell, ClipKind};
@@ -13,8 +13,8 @@ use twin::scene::ObjectModel;
 
 /// Tool and object are apart when the tracked gap is wider than this [m]: several sigmas of any usable tracker.
 const APART: f64 = 4e-3;
-/// Nearer than this the arm may be touching already [m]: a tool, a camera's pose or its scale off by as much as is met in
-/// practice moves the first touch, and a single row of touch in what counts as the arm's own names a fault of the arm.
+/// Nearer than this the arm may be touching already [m]: a tool, a camera's pose or its scale off by as much as is
+/// plausible moves the first touch, and a single row of touch in what counts as the arm's own names a fault of the arm.
 const MAY_TOUCH: f64 = 0.02;
 /// Rows of the arm between two looks: at a metre a second the tool moves by the width above [1].
 const STRIDE: usize = 4;
@@ -65,7 +65,7 @@ impl Clearance {
 }
 
 /// Until which stamp [ns] the arm of a clip surely moves alone; beyond the end where there is no object. Encoders and the object's
-/// first place tell it to the millisecond, unless the camera sees the object elsewhere; then it is seen to move.
+/// first place show it to the millisecond, unless the camera sees the object elsewhere; then it is seen to move.
 pub fn alone_until(cell: &Cell, clip: &Clip) -> u64 {
     if clip.kind == ClipKind::Excitation || clip.object.is_empty() {
         return u64::MAX;
@@ -78,7 +78,7 @@ pub fn alone_until(cell: &Cell, clip: &Clip) -> u64 {
 }
 
 /// Stamp of the first measured row at which the tool may touch the object where it stood at first; `None` where it never
-/// comes near, or the cell cannot tell.
+/// comes near, or where the cell is too little known.
 fn first_near(cell: &Cell, clip: &Clip) -> Option<u64> {
     let mut clearance = Clearance::new(cell, clip)?;
     if clip.object.is_empty() {

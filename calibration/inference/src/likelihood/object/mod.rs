@@ -8,7 +8,7 @@
 //!
 //! | file | owns |
 //! |---|---|
-//! | `nuisance` | the parameters of a clip's own |
+//! | `nuisance` | the parameters that each clip has for itself |
 //! | `deviations` | how its path deviates from any simulated one |
 //! | `clip` | a recorded clip, prepared |
 //! | `clearance` | how far tool and object are apart |
@@ -55,7 +55,7 @@ use twin::effects::CameraMemory;
 use twin::rollout::CellRollout;
 use twin::sim::SimError;
 
-/// What the tracker's noise is taken for where cell.toml does not tell it, one sigma.
+/// What the tracker's noise is taken for where cell.toml does not state it, one sigma.
 const NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 5e-3 };
 
 /// The tracker's noise, one sigma.
@@ -192,6 +192,11 @@ impl ObjectClips {
     /// What every residual of a clip is about.
     pub fn rows(&self, clip: usize) -> Vec<Row> {
         rows::rows(&self.clips[clip], self.error.joints.is_some())
+    }
+
+    /// What its numbers mean.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
     }
 
     /// What is known about the cell.

@@ -4,19 +4,18 @@
 //! Every clip has a friction and a clock of its own, and its object deviates from the simulated path: nobody simulates an
 //! impact exactly, and the error grows along the path. That deviation is a random effect, added to the simulated poses, so it
 //! costs no simulation; its scale is what an effect must beat to be believed
-//! ([`inference::forward::random_effects_scale`]).
+//! ([`super::random_effects_scale`]).
 
-use super::arm_clips::ArmClips;
+use super::Setting;
+use super::arm::ArmClips;
+use super::arm::following::Moment;
 use super::contact::Contact;
-use super::measured::{Channel, Group, Measured, Near, Reach, Row, StageName};
-use crate::diagnose::library::Library;
-use inference::engine::Engine;
-use inference::estimate::{ClipModel, Impossible};
-use inference::forward::Setting;
-use inference::forward::arm::following::Moment;
-use inference::forward::object::{self, ModelError, ObjectClips, Part, diagnosed};
-use inference::forward::random_effects::{RandomEffects, WithOwn};
-use inference::forward::recent::Recent;
+use super::object::{self, ModelError, ObjectClips, Part, diagnosed};
+use super::random_effects::{RandomEffects, WithOwn};
+use super::recent::Recent;
+use super::{Channel, Group, Likelihood, Near, Reach, Row, StageName};
+use crate::engine::Engine;
+use crate::estimate::{ClipModel, Impossible};
 use shared_mem::cell::{ClipKind, PoseNoise};
 use shared_mem::theta::Theta;
 use std::sync::Arc;
@@ -41,9 +40,12 @@ const IN_THE_PLANE: [usize; 3] = [0, 1, 5];
 /// under a blow is not modelled well enough to learn from.
 const TIPPING: PoseNoise = PoseNoise { position: 3e-3, rotation: 0.05 };
 
+/// Those of the numbers that an arm feels that touches nothing.
+type FeltByArm<'a> = Box<dyn Fn(&[f64]) -> Vec<f64> + Sync + 'a>;
+
 /// The arm where there is one, and the object.
 pub struct CellClips<'a, F> {
-    library: &'a Library,
+    felt_by_arm: FeltByArm<'a>,
     arm: Option<ArmClips<F>>,
     object: ObjectClips,
     channels: Vec<Channel>,
@@ -71,8 +73,13 @@ pub struct CellClips<'a, F> {
 type Errors = fn(&ObjectClips, usize, &[f64], &[f64]) -> Result<Vec<f64>, Impossible>;
 
 impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
-    /// Both on the same clips in the same order; without an arm, objects that move by themselves.
-    pub fn new(arm: Option<ArmClips<F>>, mut object: ObjectClips, library: &'a Library) -> Self {
+    /// Both on the same clips in the same order; without an arm, objects that move by themselves. `felt_by_arm`: those of the numbers
+    /// that an arm feels that touches nothing.
+    pub fn new(
+        arm: Option<ArmClips<F>>,
+        mut object: ObjectClips,
+        felt_by_arm: impl Fn(&[f64]) -> Vec<f64> + Sync + 'a,
+    ) -> Self {
         object.set_model_error(ModelError { joints: arm.as_ref().map(|_| 1.0), ..object.model_error() });
         let mut channels = arm.as_ref().map_or_else(Vec::new, |arm| arm.channels().to_vec());
         let first = channels.len();
@@ -103,7 +110,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             rows.push([of_arm, &poses, &joints.evidence(&object.rows(clip), in_contact)].concat());
             contact.push(joints);
         }
-        let numbers = || library.settings.settings().iter().enumerate();
+        let numbers = || object.settings().settings().iter().enumerate();
         let friction = numbers().find(|(_, setting)| **setting == Setting::Friction).map(|(k, _)| k);
         let stiffness =
             numbers().filter(|(_, setting)| matches!(setting, Setting::Stiffness(_))).map(|(k, _)| k).collect();
@@ -111,7 +118,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         let arm_alone = rows.iter().map(|_| Recent::default()).collect();
         let stepped_from = rows.iter().map(|_| Recent::default()).collect();
         Self {
-            library,
+            felt_by_arm: Box::new(felt_by_arm),
             arm,
             object,
             channels,
@@ -130,10 +137,10 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
     /// The residuals of the arm that moves alone at numbers; none where there is no arm.
     fn arm(&self, clip: usize, shared: &[f64]) -> Result<Arc<Vec<f64>>, Impossible> {
         let Some(arm) = &self.arm else { return Ok(Arc::default()) };
-        self.arm_alone[clip].at(self.library.felt_by_arm(shared), || arm.residuals_in(1, (clip, shared, &[])))
+        self.arm_alone[clip].at((self.felt_by_arm)(shared), || arm.residuals_in(1, (clip, shared, &[])))
     }
 
-    /// The residuals of the poses and of the joints in contact at numbers, a clip's own among them.
+    /// The residuals of the poses and of the joints in contact at numbers, nuisance parameters among them.
     fn since_touch(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
         self.since_touch_by(ObjectClips::errors, (clip, shared, own))
     }
@@ -173,7 +180,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         Ok(residuals)
     }
 
-    /// [`Measured::changed`] where another program simulates: what a step changes is the twin's.
+    /// [`Likelihood::changed`] where another program simulates: what a step changes is the twin's.
     fn stepped(
         &self,
         clip: usize,
@@ -252,7 +259,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<'_, F> {
     }
 }
 
-impl<F: Fn(&[f64]) -> Theta + Sync> Measured for CellClips<'_, F> {
+impl<F: Fn(&[f64]) -> Theta + Sync> Likelihood for CellClips<'_, F> {
     type Own = WithOwn;
 
     fn changed(

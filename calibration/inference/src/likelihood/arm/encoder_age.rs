@@ -1,6 +1,6 @@
 //! How old encoder readings are when controller and log get them: some microseconds that nobody states, and that a
 //! simulator with another time step has too. A heavily damped wrist follows its command within 2 ms, so that 10 us are
-//! 0.5 % of its gains: they are a clip's own number, or the gains look surer than they are.
+//! 0.5 % of its gains: it is a nuisance parameter of each clip, or the gains look surer than they are.
 
 use crate::estimate::Random;
 use shared_mem::cell::{Cell, ControllerKind};
@@ -13,12 +13,12 @@ const SIGMA: f64 = 5e-5;
 /// Joints that come later than this come late for other reasons [s].
 const MOST: f64 = 1e-4;
 
-/// The clip's own number.
+/// The nuisance parameter.
 pub(super) fn random() -> Random {
     Random { name: "encoder age".into(), sigma: SIGMA, step: 1e-6 }
 }
 
-/// The age that a clip's own number stands for [s].
+/// The age that a nuisance parameter stands for [s].
 pub(super) fn of(own: Option<&f64>) -> f64 {
     own.map_or(0.0, |own| MOST * (own / MOST).tanh())
 }

@@ -1,13 +1,40 @@
-//! What a likelihood is made of: residuals of clips under the parameters of every hypothesis at once.
+//! The likelihood of recorded clips under any parameters of the cell: what the twin makes of every clip, as residuals in sigmas of the
+//! sensors, what each of them is about, and what varies from clip to clip.
 //!
 //! One vector holds the baseline's parameters and those of every effect of the library, each effect at its neutral value. A hypothesis
 //! is a choice of which of them are free.
+//!
+//! | module | owns |
+//! |---|---|
+//! | [`setting`] | from a vector of numbers to the parameters of a cell |
+//! | [`motion`] | who moves the arm: the twin, or another program |
+//! | [`arm`] | clips with an arm: what its sensors log |
+//! | [`object`] | clips with an object: poses |
+//! | [`cell`] | both together, with the arm's joints in contact ([`contact`]) |
+//! | [`rows`] | what every residual is about |
+//! | [`random_effects`], [`random_effects_scale`] | what varies from clip to clip, and how widely under a hypothesis |
+//! | [`recent`] | what was simulated where a search has just been |
+//! | [`smoothing`] | logged series smoothed, with slopes |
 
-use inference::engine::Engine;
-use inference::estimate::{ClipModel, Impossible};
-use inference::forward::arm::following::Moment;
-use inference::forward::random_effects::{OwnNumbers, RandomEffects, WithOwn};
-pub use inference::forward::rows::{Channel, Group, Row, StageName};
+pub mod arm;
+pub mod cell;
+pub mod contact;
+pub mod motion;
+pub mod object;
+pub mod random_effects;
+pub mod random_effects_scale;
+pub mod recent;
+pub mod rows;
+pub mod setting;
+pub mod smoothing;
+
+pub use rows::{Channel, Group, Row, StageName};
+pub use setting::{Setting, Settings};
+
+use crate::engine::Engine;
+use crate::estimate::{ClipModel, Impossible};
+use arm::following::Moment;
+use random_effects::{OwnNumbers, RandomEffects, WithOwn};
 use std::sync::Arc;
 
 /// What a number can change of a clip.
@@ -20,13 +47,13 @@ pub enum Reach {
     Object,
 }
 
-/// A point nearby: what can have changed from it, the residuals there, and the numbers there, shared and the clip's own, where they
+/// A point nearby: what can have changed from it, the residuals there, and the parameters there, shared and nuisance ones, where they
 /// are known.
 pub type Near<'a> = (Reach, &'a [f64], Option<(&'a [f64], &'a [f64])>);
 
-/// Clips that tell what each of their residuals is.
-pub trait Measured: ClipModel {
-    /// Whether clips have numbers of their own. What is fitted to these clips is of this kind: a clip's own numbers mean nothing to a
+/// Clips that say what each of their residuals is, and what varies from clip to clip: all that a likelihood is made of.
+pub trait Likelihood: ClipModel {
+    /// Whether clips have nuisance parameters. What is fitted to these clips is of this kind: nuisance parameters mean nothing to a
     /// bench that knows none.
     type Own: OwnNumbers;
 
@@ -76,14 +103,14 @@ pub trait Measured: ClipModel {
     fn torque_sigma(&self) -> Option<&[f64]> {
         None
     }
-    /// The slopes of a clip's residuals by a number of its own, where they are known without a simulation.
+    /// The slopes of a clip's residuals by a nuisance parameter, where they are known without a simulation.
     fn own_slope(&self, _clip: usize, _own: usize) -> Option<&[f64]> {
         None
     }
 }
 
-/// All that was measured, each clip with its own numbers: what a diagnosis is about. Of clips that are looked at in part only
-/// [`Measured`] is known.
-pub trait Evidence: Measured<Own = WithOwn> {}
+/// All that was measured, each clip with its nuisance parameters: what a diagnosis is about. Of clips that are looked at in part only
+/// [`Likelihood`] is known.
+pub trait Evidence: Likelihood<Own = WithOwn> {}
 
-impl<E: Measured<Own = WithOwn>> Evidence for E {}
+impl<E: Likelihood<Own = WithOwn>> Evidence for E {}

@@ -4,7 +4,7 @@ use super::nuisance::Values;
 use super::outcome::Outcome;
 use super::{ObjectClips, reported};
 use crate::engine::Engine;
-use crate::forward::Settings;
+use crate::likelihood::Settings;
 use shared_mem::cell::Cell;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;

@@ -12,7 +12,7 @@ use twin::effects::CameraEffects;
 /// Poses this far from the last (or first) ones move, in sigmas of the noise: 1 of 100 000 resting poses is.
 const MOVING_SIGMAS: f64 = 8.0;
 /// The arm is looked at so often from a moment before the hit until one after the tool has let go [ns]: from then on it
-/// tells nothing about the blow.
+/// says nothing about the blow.
 const ARM_EVERY_NS: u64 = 10_000_000;
 /// The one moment: two poses of a 60 Hz tracker [ns].
 const BEFORE_HIT_NS: u64 = 40_000_000;

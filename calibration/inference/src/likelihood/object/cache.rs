@@ -2,8 +2,8 @@
 
 use super::nuisance::Values;
 use super::outcome::{Outcome, Path};
-use crate::forward::motion::felt_by_arm;
-use crate::forward::recent::Recent;
+use crate::likelihood::motion::felt_by_arm;
+use crate::likelihood::recent::Recent;
 use nalgebra::Isometry3;
 use shared_mem::theta::{ArmTheta, EffectTheta, Theta};
 use twin::rollout::{CellTrace, Checkpoint};

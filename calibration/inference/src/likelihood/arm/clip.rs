@@ -2,7 +2,7 @@
 //! simulated, rows that are averaged, joints that are dead. Stamps of the recording, SI.
 
 use super::velocity;
-use crate::forward::object::noise_of;
+use crate::likelihood::object::noise_of;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::{Clip, JointSeries, ReadError};
@@ -31,7 +31,7 @@ const DEAD: f64 = 0.01;
 
 /// So many usual steps between two rows may be a jump of the clock.
 const JUMP_STEPS: u64 = 10;
-/// Rows before it tell how fast the arm was.
+/// Rows before it show how fast the arm was [1].
 const BEFORE_JUMP: usize = 5;
 /// The arm went on by a step rather than by the gap when that leaves less than this share of the other's error.
 const JUMP_SHARE: f64 = 0.2;
@@ -45,7 +45,7 @@ pub enum ArmClipError {
     /// Nothing was logged.
     #[error("it holds no measured joints; record it again")]
     Empty,
-    /// Nobody logged what the arm was told.
+    /// Nobody logged what the arm was commanded to do.
     #[error(
         "it holds no commands, without which the twin's arm cannot be led: what can be explained are its torques, where it has any, by `calibration diagnose --torques`"
     )]
@@ -96,7 +96,7 @@ pub struct ArmClip {
     pub alone_until_ns: u64,
     /// Joints that do not follow, or whose readings stand still.
     pub dead: [bool; MAX_JOINTS],
-    /// The commands as they were given, where dead joints were told to stay instead.
+    /// The commands as they were given, where dead joints were commanded to stay instead.
     pub(super) given: Option<JointSeries>,
     /// What a reader has to know, one sentence each.
     pub warnings: Vec<String>,
@@ -193,7 +193,7 @@ impl ArmClip {
         })
     }
 
-    /// Whether a joint is dead and told to stay where it is, rather than to follow its commands unseen.
+    /// Whether a joint is dead and commanded to stay where it is, rather than to follow its commands unseen.
     pub fn stands_still(&self, joint: usize) -> bool {
         self.dead[joint] && self.given.is_some()
     }
@@ -286,7 +286,7 @@ fn dead_joints(clip: &Clip) -> [bool; MAX_JOINTS] {
     })
 }
 
-/// A dead joint is told to stay where it is, so that the others feel it as it was.
+/// A dead joint is commanded to stay where it is, so that the others feel it as it was.
 fn hold_dead(clip: &mut Clip, dead: &[bool; MAX_JOINTS]) {
     let dof = clip.desired.dof;
     for joint in (0..dof).filter(|joint| dead[*joint]) {

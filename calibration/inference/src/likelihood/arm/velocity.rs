@@ -61,7 +61,7 @@ pub struct Late {
 }
 
 impl Motion<'_> {
-    /// The comparison; `None` for a joint that does not move enough to tell.
+    /// The comparison; `None` for a joint that does not move enough to compare.
     pub fn compared(&self, joint: usize) -> Option<Compared> {
         let Self { t, q, dq, noise } = *self;
         let rows = WINDOW_ROWS.max((WINDOW / step(t).max(1e-12)).round() as usize).min(t.len() / 4);
@@ -112,7 +112,7 @@ impl Compared {
     }
 }
 
-/// Every joint of a log that moves enough to tell.
+/// Every joint of a log that moves enough to compare.
 fn compared_in(log: &JointSeries) -> Vec<Compared> {
     if log.dq.is_empty() {
         return Vec::new();

@@ -39,7 +39,7 @@ pub fn sigma(signal: &[f64]) -> f64 {
 }
 
 /// One sigma of a sensor from that of its signal in each of several clips: what holds for most. A clip in which the reading
-/// never changes has 0 and tells nothing: the joint stood still, and what moves it less than a step is not seen.
+/// never changes has 0 and says nothing: the joint stood still, and what moves it less than a step is not seen.
 pub fn of_clips(sigmas: impl Iterator<Item = f64>) -> f64 {
     let mut told: Vec<f64> = sigmas.filter(|sigma| *sigma > 0.0).collect();
     told.sort_unstable_by(f64::total_cmp);
@@ -51,6 +51,24 @@ fn resolution(signal: &[f64]) -> f64 {
     let steps = signal.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
     let smallest = steps.fold(f64::INFINITY, f64::min);
     if smallest.is_finite() { smallest } else { 0.0 }
+}
+
+/// How many neighbouring residuals say the same: 1 for white ones, `1 + 2 sum rho` up to where `rho` first falls below zero.
+pub fn correlation_length(values: &[f64]) -> f64 {
+    let power: f64 = values.iter().map(|v| v * v).sum();
+    if power <= 0.0 {
+        return 1.0;
+    }
+    let rho = |lag: usize| values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum::<f64>() / power;
+    let mut length = 1.0;
+    for lag in 1..values.len() / 2 {
+        let rho = rho(lag);
+        if rho <= 0.0 {
+            break;
+        }
+        length += 2.0 * rho;
+    }
+    length
 }
 
 #[cfg(test)]
@@ -78,5 +96,18 @@ mod tests {
     fn clips_in_which_a_joint_stood_still_do_not_hide_its_noise() {
         assert_eq!(of_clips([0.0, 0.0, 4e-4, 0.0, 5e-4, 6e-4, 0.0].into_iter()), 5e-4);
         assert_eq!(of_clips([0.0; 3].into_iter()), 0.0);
+    }
+
+    fn white(count: usize) -> Vec<f64> {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
+        // A sum of twelve uniform numbers is normal enough, with unit variance.
+        (0..count).map(|_| (0..12).map(|_| rng.random_range(-0.5..0.5)).sum()).collect()
+    }
+
+    #[test]
+    fn white_residuals_stand_for_themselves_and_smooth_ones_for_each_other() {
+        assert!(correlation_length(&white(2000)) < 1.6);
+        let smooth: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.01).sin()).collect();
+        assert!(correlation_length(&smooth) > 50.0);
     }
 }

@@ -4,7 +4,7 @@
 use super::deviations::{AFTER_HITS, ALONE, Deviation};
 use super::noise_of;
 use crate::estimate::Random;
-use crate::forward::random_effects::RandomEffects;
+use crate::likelihood::random_effects::RandomEffects;
 use nalgebra::Vector3;
 use shared_mem::cell::{Cell, ClipKind};
 
@@ -51,7 +51,7 @@ pub fn diagnosed(kind: ClipKind) -> Vec<Nuisance> {
     before.chain(path.iter().map(Nuisance::Path)).collect()
 }
 
-/// Scatter of friction from clip to clip where cell.toml does not tell it, one sigma of ln(mu) [1]: a choice.
+/// Scatter of friction from clip to clip where cell.toml does not state it, one sigma of ln(mu) [1]: a choice.
 const FRICTION_SCATTER: f64 = 0.03;
 /// The first place of an object that was let go is read off its first poses, right to so many sigmas of one of them [1]: a choice.
 const START_SIGMAS: f64 = 3.0;
