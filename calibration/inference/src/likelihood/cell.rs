@@ -140,13 +140,8 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         self.arm_alone[clip].at((self.felt_by_arm)(shared), || arm.residuals_in(1, (clip, shared, &[])))
     }
 
-    /// The residuals of the poses and of the joints in contact at numbers, nuisance parameters among them.
-    fn since_touch(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
-        self.since_touch_by(ObjectClips::errors, (clip, shared, own))
-    }
-
-    /// The same out of errors that are given.
-    fn since_touch_by(
+    /// The residuals of the poses and of the joints in contact at numbers, nuisance parameters among them, out of errors that are given.
+    fn since_touch(
         &self,
         errors: Errors,
         (clip, shared, own): (usize, &[f64], &[f64]),
@@ -178,33 +173,6 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         let stiffness: Vec<f64> = self.stiffness.iter().map(|k| shared[*k]).collect();
         residuals.extend(contact.in_sigmas(&joints, &stiffness));
         Ok(residuals)
-    }
-
-    /// [`Likelihood::changed`] where another program simulates: what a step changes is the twin's.
-    fn stepped(
-        &self,
-        clip: usize,
-        (shared, own): (&[f64], &[f64]),
-        (reach, base, at): (Reach, &[f64], (&[f64], &[f64])),
-        out: &mut Vec<f64>,
-    ) -> Result<(), Impossible> {
-        let of_arm = self.of_arm(clip);
-        out.clear();
-        match &self.arm {
-            Some(arm) if reach != Reach::Object => {
-                arm.stepped(clip, (shared, &[]), ((at.0, &[]), &base[..of_arm]), out)?;
-            }
-            _ => out.extend_from_slice(&base[..of_arm]),
-        }
-        if reach == Reach::Arm {
-            out.extend_from_slice(&base[of_arm..]);
-            return Ok(());
-        }
-        let twins = |(shared, own)| self.since_touch_by(ObjectClips::twins_errors, (clip, shared, own));
-        let before = self.stepped_from[clip].at([at.0, at.1].concat(), || twins(at))?;
-        let after = twins((shared, own))?;
-        out.extend(base[of_arm..].iter().zip(&*before).zip(after).map(|((base, before), after)| base + after - before));
-        Ok(())
     }
 
     /// How many rows the arm has that moves alone.
@@ -251,11 +219,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ClipModel for CellClips<'_, F> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        let others = self.since_touch(clip, shared, own)?;
-        out.clear();
-        out.extend_from_slice(&self.arm(clip, shared)?);
-        out.extend(others);
-        Ok(())
+        self.changed(clip, (shared, own), (Reach::All, &[], None), out)
     }
 }
 
@@ -269,27 +233,25 @@ impl<F: Fn(&[f64]) -> Theta + Sync> Likelihood for CellClips<'_, F> {
         (reach, base, at): Near<'_>,
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
-        if let (Some(_), Some(at)) = (self.engine(), at) {
-            return self.stepped(clip, (shared, own), (reach, base, at), out);
+        let (of_arm, numbers) = (self.of_arm(clip), (clip, shared, own));
+        // Where another program simulates, the twin says what a step changes.
+        let stepped = at.filter(|_| self.engine().is_some());
+        out.clear();
+        match (&self.arm, stepped) {
+            (None, _) => {}
+            _ if reach == Reach::Object => out.extend(&base[..of_arm]),
+            (Some(arm), Some((at, _))) => arm.stepped(clip, (shared, &[]), ((at, &[]), &base[..of_arm]), out)?,
+            (Some(_), None) => out.extend_from_slice(&self.arm(clip, shared)?),
         }
-        let of_arm = self.of_arm(clip);
-        match (reach, &self.arm) {
-            (Reach::Arm, Some(_)) => {
-                out.clear();
-                out.extend_from_slice(&self.arm(clip, shared)?);
-                out.extend(&base[of_arm..]);
+        match stepped {
+            _ if reach == Reach::Arm => out.extend(&base[of_arm..]),
+            None => out.extend(self.since_touch(ObjectClips::errors, numbers)?),
+            Some((at, at_own)) => {
+                let twins = |numbers: (usize, &[f64], &[f64])| self.since_touch(ObjectClips::twins_errors, numbers);
+                let before = self.stepped_from[clip].at([at, at_own].concat(), || twins((clip, at, at_own)))?;
+                let rows = base[of_arm..].iter().zip(&*before).zip(twins(numbers)?);
+                out.extend(rows.map(|((base, before), after)| base + after - before));
             }
-            (Reach::Arm, None) => {
-                out.clear();
-                out.extend(base);
-            }
-            (Reach::Object, _) => {
-                let others = self.since_touch(clip, shared, own)?;
-                out.clear();
-                out.extend(&base[..of_arm]);
-                out.extend(others);
-            }
-            _ => self.residuals(clip, shared, own, out)?,
         }
         Ok(())
     }

@@ -80,21 +80,6 @@ impl Setting {
         }
     }
 
-    /// SI unit of the number itself; `1` without.
-    pub fn unit(&self) -> String {
-        match self {
-            Self::Stiffness(_) => "N m/rad".into(),
-            Self::Damping(_) => "N m s/rad".into(),
-            Self::Friction | Self::TipFriction => "1".into(),
-            Self::Mass => "kg".into(),
-            Self::CentreOfMass(_) => "m".into(),
-            Self::Effect { name, parameter, inverse, .. } => {
-                let unit = parameter_of(name, parameter).map_or("1", |p| p.unit);
-                if *inverse { format!("1/({unit})") } else { unit.into() }
-            }
-        }
-    }
-
     /// Name of the parameter that the number is one of: `stiffness`, `command_delay.delay`.
     pub fn parameter(&self) -> String {
         match self {
@@ -112,8 +97,12 @@ impl Setting {
     /// The parameter's SI unit; `1` without.
     pub fn physical_unit(&self) -> String {
         match self {
-            Self::Effect { name, parameter, .. } => parameter_of(name, parameter).map_or("1", |p| p.unit).into(),
-            other => other.unit(),
+            Self::Stiffness(_) => "N m/rad".into(),
+            Self::Damping(_) => "N m s/rad".into(),
+            Self::Friction | Self::TipFriction => "1".into(),
+            Self::Mass => "kg".into(),
+            Self::CentreOfMass(_) => "m".into(),
+            Self::Effect { .. } => self.of_effect().map_or("1", |p| p.unit).into(),
         }
     }
 

@@ -104,7 +104,7 @@ fn delay(numbers: &[f64], model: &Model<'_>, clips: &Used) -> Option<(f64, f64)>
     // Joint by joint: sums of error x speed, speed squared, error squared.
     let mut sums = vec![[0.0; 3]; dof];
     for clip in clips.split.train.iter().take(CLIPS) {
-        let predicted = model.predict(*clip, numbers, &[]).ok()?;
+        let predicted = model.predict_in(1, (*clip, numbers, &[])).ok()?;
         let clip = model.clip(*clip);
         let measured = &clip.recorded.measured;
         let rows: Vec<usize> = clip.averaged().map(|bin| bin[0]).collect();

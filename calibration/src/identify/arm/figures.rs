@@ -108,7 +108,7 @@ fn errors(model: &Model<'_>, clip: usize, random: &[Random], numbers: &[f64]) ->
     } else {
         Vec::new()
     };
-    let predicted = model.predict(clip, numbers, &own)?;
+    let predicted = model.predict_in(1, (clip, numbers, &own))?;
     let clip = model.clip(clip);
     let measured = &clip.recorded.measured;
     let (mut times, mut rows) = (Vec::new(), Vec::new());

@@ -256,15 +256,8 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         Ok(peaks)
     }
 
-    /// What the sensors would have read at every measured row; rows that are not simulated are left at zero.
-    ///
-    /// # Errors
-    /// As [`Self::peaks`].
-    pub fn predict(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<Reading>, Impossible> {
-        self.predict_in(1, (clip, shared, own))
-    }
-
-    /// The same with every control period integrated in `parts`.
+    /// What the sensors would have read at every measured row of a clip, at shared numbers and its own, with every control period
+    /// integrated in `parts`; rows that are not simulated are left at zero.
     ///
     /// # Errors
     /// As [`Self::peaks`].
