@@ -31,8 +31,8 @@ const COORDINATES: [(&str, &str); 6] = [
 ];
 /// Parts of a clip with weights of their own: a twin is right about rest long before it is right about a hit.
 const PARTS: usize = 3;
-/// The blow and what it does to the object at once [s]; what comes after is sliding, pushed or free.
-const HIT: f64 = 0.05;
+/// The blow and what it does to the object at once [s], a choice; what comes after is sliding, pushed or free.
+const HIT_DURATION: f64 = 0.05;
 
 /// Coordinates that sliding changes: x, y, yaw.
 const IN_THE_PLANE: [usize; 3] = [0, 1, 5];
@@ -203,7 +203,7 @@ fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
             Part::Before => (0, StageName::Rest, "before the hit"),
             Part::After => (0, StageName::Rest, "after the slide"),
             Part::Hit | Part::Slide if alone => (2, StageName::Slide, "by itself"),
-            _ if since < HIT => (1, StageName::Hit, "blow"),
+            _ if since < HIT_DURATION => (1, StageName::Hit, "blow"),
             Part::Hit => (2, StageName::Slide, "beside the tool"),
             Part::Slide => (2, StageName::Slide, "free"),
         };

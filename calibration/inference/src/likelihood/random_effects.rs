@@ -9,7 +9,7 @@ use std::fmt::Debug;
 use std::ops::Range;
 
 /// Degrees of freedom of the heavy tails [1], a choice: low enough that ten sigmas occur now and then.
-const FREEDOM: f64 = 3.0;
+const DEGREES_OF_FREEDOM: f64 = 3.0;
 
 /// Whether the clips of a bench have nuisance parameters.
 pub trait OwnNumbers: Debug + Clone + Copy + Send + Sync + 'static {}
@@ -68,7 +68,7 @@ impl RandomEffects {
     /// By how much more (or less) than at one sigma the heavy-tailed ones of a clip are held: the weight with which
     /// reweighted least squares find the most likely values.
     fn hold(&self, own: &[f64]) -> f64 {
-        (FREEDOM + self.heavy.len() as f64) / (FREEDOM + self.heavy_square(own))
+        (DEGREES_OF_FREEDOM + self.heavy.len() as f64) / (DEGREES_OF_FREEDOM + self.heavy_square(own))
     }
 
     /// Prior precision of every parameter near `own`; 1 for those that do not scatter, which keeps them where they are.
@@ -91,7 +91,7 @@ impl RandomEffects {
     }
 
     fn tails(&self, own: &[f64]) -> f64 {
-        (FREEDOM + self.heavy.len() as f64) * (self.heavy_square(own) / FREEDOM).ln_1p()
+        (DEGREES_OF_FREEDOM + self.heavy.len() as f64) * (self.heavy_square(own) / DEGREES_OF_FREEDOM).ln_1p()
     }
 
     /// What a normal prior with [`Self::precision`] counts less than the heavy-tailed one, as part of a deviance whose

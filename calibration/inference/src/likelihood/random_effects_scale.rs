@@ -15,7 +15,7 @@ pub const MIN_SCALE: f64 = 0.125;
 /// Scales of the usual scatter that are tried [1].
 const SCALES: [f64; 4] = [1.0, 0.5, 0.25, MIN_SCALE];
 /// Steps in which a clip finds its nuisance parameters at another scale [1]; every one takes the hold of the last.
-const STEPS: usize = 12;
+const REWEIGHTED_STEPS: usize = 12;
 
 /// A clip around its nuisance parameters.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -51,7 +51,7 @@ fn deviance(clip: &Around, scatter: &RandomEffects) -> f64 {
     let held = |own: &DVector<f64>| DVector::from_vec(scatter.precision(own.as_slice()));
     let solved = |precision: &DVector<f64>| Cholesky::new(&inner + DMatrix::from_diagonal(precision));
     let start = own.clone();
-    for _ in 0..STEPS {
+    for _ in 0..REWEIGHTED_STEPS {
         let precision = held(&own);
         let Some(factor) = solved(&precision) else { return f64::INFINITY };
         // Minimum of |r + B (u - start)|^2 + u' P u.

@@ -9,16 +9,16 @@ pub const HALF_NS: u64 = 80_000_000;
 /// The same where stamps are uneven: what arrives a millisecond late at 1 rad/s is 1 mrad off, hundreds of times the encoder's
 /// noise.
 const UNEVEN_HALF_NS: u64 = 160_000_000;
-/// Stamps are uneven where more than this share of the steps differs from the usual one by more than a quarter of it.
-const UNEVEN: f64 = 0.02;
-/// Slow logs are smoothed over at least so many rows to either side: a cubic has four coefficients.
-const ROWS: u64 = 4;
+/// Stamps are uneven where more than this share of the steps differs from the usual one by more than a quarter of it [1]: a choice.
+const UNEVEN_SHARE: f64 = 0.02;
+/// Slow logs are smoothed over at least so many rows to either side [1]: a cubic has four coefficients.
+const MIN_ROWS: u64 = 4;
 
 /// Half the time over which a log is smoothed [ns]; `None` of fewer than two rows.
 pub fn half_width(stamps: &[u64]) -> Option<u64> {
     let (first, last) = (*stamps.first()?, *stamps.last()?);
     let usual = (last - first) / (stamps.len() as u64 - 1).max(1);
-    (last > first).then(|| if uneven(stamps) { UNEVEN_HALF_NS } else { HALF_NS }.max(ROWS * usual))
+    (last > first).then(|| if uneven(stamps) { UNEVEN_HALF_NS } else { HALF_NS }.max(MIN_ROWS * usual))
 }
 
 fn uneven(stamps: &[u64]) -> bool {
@@ -26,7 +26,7 @@ fn uneven(stamps: &[u64]) -> bool {
     steps.sort_unstable();
     let usual = steps.get(steps.len() / 2).copied().unwrap_or(1);
     let odd = steps.iter().filter(|step| 4 * step.abs_diff(usual) > usual).count();
-    odd as f64 > UNEVEN * steps.len() as f64
+    odd as f64 > UNEVEN_SHARE * steps.len() as f64
 }
 
 /// Positions and velocities at stamps, each from a cubic through the rows of positions around it.

@@ -14,26 +14,26 @@ use twin::replay::in_model_order;
 
 /// Rows within this time are averaged: no motion of an arm is that fast, and the average of white noise loses nothing [ns].
 const AVERAGED_NS: u64 = 5_000_000;
-/// A log slower than this does not show how a joint follows its command [Hz].
-const SLOWEST: f64 = 28.0;
-/// A clip shorter than this says nothing [s].
-const SHORTEST: f64 = 0.5;
+/// A log slower than this does not show how a joint follows its command [Hz]: logs of 30 Hz with some jitter do.
+const MIN_RATE: f64 = 28.0;
+/// A clip shorter than this says nothing [s]: a choice.
+const MIN_DURATION: f64 = 0.5;
 /// A stretch that counts as a witness of its own: several times as long as a joint remembers [s].
-const STRETCH: f64 = 0.7;
+const WITNESS_DURATION: f64 = 0.7;
 /// The tool may touch the object this long before its poses show it: a slow camera's latency [ns].
 const BEFORE_MOTION_NS: u64 = 150_000_000;
-/// An object moves when a pose is so many sigmas from the first ones.
+/// An object moves when a pose is so many sigmas from the first ones [1]: a choice.
 const MOVED_SIGMAS: f64 = 6.0;
-/// A command that moves a joint this far should show [rad].
-const COMMANDED: f64 = 0.02;
-/// A joint that follows less than this share of its command is dead.
-const DEAD: f64 = 0.01;
+/// A command that moves a joint this far should show [rad]: a choice.
+const COMMANDED_MOTION: f64 = 0.02;
+/// A joint that follows less than this share of its command is dead [1]: a choice.
+const DEAD_SHARE: f64 = 0.01;
 
-/// So many usual steps between two rows may be a jump of the clock.
+/// So many usual steps between two rows may be a jump of the clock [1]: a choice.
 const JUMP_STEPS: u64 = 10;
 /// Rows before it show how fast the arm was [1].
-const BEFORE_JUMP: usize = 5;
-/// The arm went on by a step rather than by the gap when that leaves less than this share of the other's error.
+const ROWS_BEFORE_JUMP: usize = 5;
+/// The arm went on by a step rather than by the gap when that leaves less than this share of the other's error [1]: a choice.
 const JUMP_SHARE: f64 = 0.2;
 
 /// A clip cannot be used for the arm.
@@ -54,7 +54,7 @@ pub enum ArmClipError {
     #[error("it is logged at {0:.0} Hz; below 30 Hz a log does not show how a joint follows: record at 100 Hz or more")]
     Slow(f64),
     /// Too little is left.
-    #[error("only {0:.2} s of it can be simulated; at least {SHORTEST} s are needed")]
+    #[error("only {0:.2} s of it can be simulated; at least {MIN_DURATION} s are needed")]
     Short(f64),
     /// Commands and measurements are of different times.
     #[error("commands and measured joints do not overlap in time: let one machine stamp both, then record again")]
@@ -128,7 +128,7 @@ impl ArmClip {
         }
         let step_ns = usual_step(&recorded.measured.stamps_ns);
         let rate = 1e9 / step_ns as f64;
-        if rate < SLOWEST {
+        if rate < MIN_RATE {
             return Err(ArmClipError::Slow(rate));
         }
         let (told, rows) = (&recorded.desired.stamps_ns, &recorded.measured.stamps_ns);
@@ -173,7 +173,7 @@ impl ArmClip {
         }
         let bins = bins(&asked_ns, &runs, step_ns);
         let seconds = rows.len() as f64 / rate;
-        let stretches = (seconds / STRETCH).round().max(1.0) as usize;
+        let stretches = (seconds / WITNESS_DURATION).round().max(1.0) as usize;
         let stretch = bins.len().div_ceil(stretches);
         Ok(Self {
             recorded,
@@ -217,7 +217,7 @@ impl ArmClip {
 
     /// The clip, unless it is too short to say anything about the arm.
     pub(super) fn long_enough(self) -> Result<Self, ArmClipError> {
-        if self.seconds < SHORTEST { Err(ArmClipError::Short(self.seconds)) } else { Ok(self) }
+        if self.seconds < MIN_DURATION { Err(ArmClipError::Short(self.seconds)) } else { Ok(self) }
     }
 
     /// The longest stretch of one clock and without a hole, where there is more than one of them or something is cut off.
@@ -255,14 +255,14 @@ fn usual_step(stamps_ns: &[u64]) -> u64 {
 /// lost.
 fn clock_jump(measured: &JointSeries, step_ns: u64) -> Option<usize> {
     let stamps = &measured.stamps_ns;
-    (BEFORE_JUMP..stamps.len() - 1).find(|&row| {
+    (ROWS_BEFORE_JUMP..stamps.len() - 1).find(|&row| {
         let gap_ns = stamps[row + 1] - stamps[row];
         if gap_ns < JUMP_STEPS * step_ns {
             return false;
         }
-        let before_ns = (stamps[row] - stamps[row - BEFORE_JUMP]).max(1) as f64;
+        let before_ns = (stamps[row] - stamps[row - ROWS_BEFORE_JUMP]).max(1) as f64;
         let (mut by_clock, mut by_step) = (0.0, 0.0);
-        let rows = measured.q_row(row - BEFORE_JUMP).iter().zip(measured.q_row(row)).zip(measured.q_row(row + 1));
+        let rows = measured.q_row(row - ROWS_BEFORE_JUMP).iter().zip(measured.q_row(row)).zip(measured.q_row(row + 1));
         for ((earlier, last), next) in rows {
             let rate = (last - earlier) / before_ns;
             by_clock += (next - last - rate * gap_ns as f64).abs();
@@ -282,7 +282,7 @@ fn travel(series: &JointSeries, joint: usize) -> f64 {
 fn dead_joints(clip: &Clip) -> [bool; MAX_JOINTS] {
     std::array::from_fn(|joint| {
         let commanded = travel(&clip.desired, joint);
-        joint < clip.measured.dof && commanded > COMMANDED && travel(&clip.measured, joint) < DEAD * commanded
+        joint < clip.measured.dof && commanded > COMMANDED_MOTION && travel(&clip.measured, joint) < DEAD_SHARE * commanded
     })
 }
 

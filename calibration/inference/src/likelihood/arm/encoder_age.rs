@@ -9,18 +9,18 @@ use shared_mem::theta::Theta;
 use twin::control::{CommandTrack, Reading};
 
 /// One sigma of what is known beforehand [s]: a twentieth of a control period.
-const SIGMA: f64 = 5e-5;
+const AGE_SIGMA: f64 = 5e-5;
 /// Joints that come later than this come late for other reasons [s].
-const MOST: f64 = 1e-4;
+const MAX_AGE: f64 = 1e-4;
 
 /// The nuisance parameter.
 pub(super) fn random() -> Random {
-    Random { name: "encoder age".into(), sigma: SIGMA, step: 1e-6 }
+    Random { name: "encoder age".into(), sigma: AGE_SIGMA, step: 1e-6 }
 }
 
 /// The age that a nuisance parameter stands for [s].
 pub(super) fn of(own: Option<&f64>) -> f64 {
-    own.map_or(0.0, |own| MOST * (own / MOST).tanh())
+    own.map_or(0.0, |own| MAX_AGE * (own / MAX_AGE).tanh())
 }
 
 /// Gains and commands under which fresh readings give the torque that old ones give under `theta` and `desired`:

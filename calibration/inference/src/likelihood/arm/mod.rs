@@ -59,8 +59,8 @@ const SHORT_CLIP: f64 = 15.0;
 /// Scatter of the start velocity that such logs leave, one sigma [rad/s].
 const START_VELOCITY: f64 = 0.1;
 
-/// The others feel a joint move when the error is less than this share of what it is with the joint at rest.
-const FELT: f64 = 0.9;
+/// The others feel a joint move when the error is less than this share of what it is with the joint at rest [1]: a choice.
+const FELT_SHARE: f64 = 0.9;
 
 /// How measured rows become residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -185,7 +185,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
             let still = self.cost(clip, shared);
             let held = std::mem::replace(&mut self.clips[clip], unseen);
             self.recent[clip] = Default::default();
-            if self.cost(clip, shared) >= FELT * still {
+            if self.cost(clip, shared) >= FELT_SHARE * still {
                 self.clips[clip] = held;
             }
         }

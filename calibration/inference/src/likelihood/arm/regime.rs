@@ -2,10 +2,10 @@
 
 use shared_mem::recording::JointSeries;
 
-/// A joint slower than this stands [rad/s].
-const STILL: f64 = 0.02;
-/// Share of a joint's top speed from which on it is fast.
-const FAST: f64 = 0.5;
+/// A joint slower than this stands [rad/s]: a choice.
+const STANDING_SPEED: f64 = 0.02;
+/// Share of a joint's top speed from which on it is fast [1]: a choice.
+const FAST_SHARE: f64 = 0.5;
 
 /// The fastest that each joint is commanded to move in any clip [rad/s].
 pub(super) struct Regimes(Vec<f64>);
@@ -26,9 +26,9 @@ impl Regimes {
         let row = desired.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).saturating_sub(1);
         let dq = desired.dq_row(row).map_or(0.0, |dq| dq[joint]);
         match dq {
-            _ if dq.abs() < STILL => "standing or turning round",
-            _ if dq > FAST * self.0[joint] => "fast forward",
-            _ if dq < -FAST * self.0[joint] => "fast backward",
+            _ if dq.abs() < STANDING_SPEED => "standing or turning round",
+            _ if dq > FAST_SHARE * self.0[joint] => "fast forward",
+            _ if dq < -FAST_SHARE * self.0[joint] => "fast backward",
             _ if dq > 0.0 => "slow forward",
             _ => "slow backward",
         }

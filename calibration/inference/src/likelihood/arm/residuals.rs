@@ -14,7 +14,7 @@ use shared_mem::time::TICK;
 use twin::control::Reading;
 
 /// A simulated joint that is two turns from its reading has left all bounds [rad]; a reading that wraps around is off by one.
-const FLOWN: f64 = 4.0 * std::f64::consts::PI;
+const MAX_ERROR: f64 = 4.0 * std::f64::consts::PI;
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// How often the twin is asked for each row.
@@ -47,7 +47,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     pub(super) fn compared(&self, clip: &ArmClip, readings: &[Reading]) -> Result<Vec<f64>, Impossible> {
         let near = |(row, reading): (&usize, &Reading)| {
             let measured = clip.recorded.measured.q_row(*row);
-            measured.iter().zip(&reading.state.q).all(|(measured, q)| (q - measured).abs() < FLOWN)
+            measured.iter().zip(&reading.state.q).all(|(measured, q)| (q - measured).abs() < MAX_ERROR)
         };
         let places = places(clip, self.sampling, self.channels.len());
         let out: Vec<f64> = places.map(|(channel, bin)| self.residual(clip, readings, (channel, bin))).collect();

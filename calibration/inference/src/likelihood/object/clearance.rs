@@ -12,15 +12,15 @@ use twin::replay::in_model_order;
 use twin::scene::ObjectModel;
 
 /// Tool and object are apart when the tracked gap is wider than this [m]: several sigmas of any usable tracker.
-const APART: f64 = 4e-3;
+const APART_GAP: f64 = 4e-3;
 /// Nearer than this the arm may be touching already [m]: a tool, a camera's pose or its scale off by as much as is
 /// plausible moves the first touch, and a single row of touch in what counts as the arm's own names a fault of the arm.
 const MAY_TOUCH: f64 = 0.02;
-/// Rows of the arm between two looks: at a metre a second the tool moves by the width above [1].
-const STRIDE: usize = 4;
+/// Rows of the arm between two looks [1]: at a metre a second and 1 kHz the tool moves by the gap above.
+const STRIDE_ROWS: usize = 4;
 
 /// An object moves that is seen so far from where it stood [m]: beyond the noise of trackers.
-const SEEN: f64 = 6e-3;
+const SEEN_MOTION: f64 = 6e-3;
 /// Before the object is seen to move, the tool has touched it already for at most this long [ns].
 const TOUCH_MARGIN_NS: u64 = 60_000_000;
 
@@ -60,7 +60,7 @@ impl Clearance {
 
     /// Whether they are apart when pose `row` was taken.
     pub(super) fn apart(&mut self, row: usize) -> bool {
-        self.gap(row) > APART
+        self.gap(row) > APART_GAP
     }
 }
 
@@ -72,7 +72,7 @@ pub fn alone_until(cell: &Cell, clip: &Clip) -> u64 {
     }
     let place = |row: usize| Vector3::from(clip.object.poses[row].position());
     let start = place(0);
-    let moved = (0..clip.object.len()).find(|row| (place(*row) - start).norm() > SEEN);
+    let moved = (0..clip.object.len()).find(|row| (place(*row) - start).norm() > SEEN_MOTION);
     let seen = moved.map_or(u64::MAX, |row| clip.object.stamps_ns[row].saturating_sub(TOUCH_MARGIN_NS));
     first_near(cell, clip).map_or(seen, |near| near.min(seen))
 }
@@ -84,7 +84,7 @@ fn first_near(cell: &Cell, clip: &Clip) -> Option<u64> {
     if clip.object.is_empty() {
         return None;
     }
-    let reach = MAY_TOUCH.min(0.5 * clearance.between(0, 0)).max(APART);
-    let near = (0..clip.measured.len()).step_by(STRIDE).find(|row| clearance.between(*row, 0) <= reach)?;
-    Some(clip.measured.stamps_ns[near.saturating_sub(STRIDE)])
+    let reach = MAY_TOUCH.min(0.5 * clearance.between(0, 0)).max(APART_GAP);
+    let near = (0..clip.measured.len()).step_by(STRIDE_ROWS).find(|row| clearance.between(*row, 0) <= reach)?;
+    Some(clip.measured.stamps_ns[near.saturating_sub(STRIDE_ROWS)])
 }

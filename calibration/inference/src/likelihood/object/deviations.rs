@@ -15,8 +15,8 @@ use super::{Channel, ObjectClips, Part, Row};
 use nalgebra::Vector3;
 use shared_mem::recording::ObjectSeries;
 
-/// A path shorter than this says nothing about how far along it the object is [m].
-const SHORT: f64 = 0.01;
+/// A path shorter than this says nothing about how far along it the object is [m]: ten times a tracker's noise.
+const MIN_WAY: f64 = 0.01;
 
 /// One way in which a path deviates.
 #[derive(Debug, PartialEq)]
@@ -35,31 +35,31 @@ const fn deviation(name: &'static str, coordinate: Coordinate, shape: Shape, sig
 /// Deviation of a clip's end, one sigma [m, rad]: strokes of another engine deviate from the twin that is given their true parameters by
 /// this at the end of the path in a clip like most. Each stage of a clip is allowed as much; how widely a session's clips scatter is
 /// estimated anyway ([`crate::likelihood::random_effects_scale`]).
-const PLACE: f64 = 1e-3;
-const TURN: f64 = 0.012;
+const PLACE_SIGMA: f64 = 1e-3;
+const TURN_SIGMA: f64 = 0.012;
 
 /// After a hit: the deviation when the tool has let go, on the way there more than in proportion, and what the free slide makes of it by
 /// its end.
 pub(super) const AFTER_HITS: [Deviation; 9] = [
-    deviation("x when let go", Coordinate::X, Shape::Held, PLACE),
-    deviation("y when let go", Coordinate::Y, Shape::Held, PLACE),
-    deviation("yaw when let go", Coordinate::Yaw, Shape::Held, TURN),
-    deviation("x on the way", Coordinate::X, Shape::Way, 0.5 * PLACE),
-    deviation("y on the way", Coordinate::Y, Shape::Way, 0.5 * PLACE),
-    deviation("yaw on the way", Coordinate::Yaw, Shape::Way, 0.5 * TURN),
-    deviation("along the slide", Coordinate::Along, Shape::InTime, PLACE),
-    deviation("across the slide", Coordinate::Across, Shape::InWay, PLACE),
-    deviation("yaw of the slide", Coordinate::Yaw, Shape::InWay, TURN),
+    deviation("x when let go", Coordinate::X, Shape::Held, PLACE_SIGMA),
+    deviation("y when let go", Coordinate::Y, Shape::Held, PLACE_SIGMA),
+    deviation("yaw when let go", Coordinate::Yaw, Shape::Held, TURN_SIGMA),
+    deviation("x on the way", Coordinate::X, Shape::Way, 0.5 * PLACE_SIGMA),
+    deviation("y on the way", Coordinate::Y, Shape::Way, 0.5 * PLACE_SIGMA),
+    deviation("yaw on the way", Coordinate::Yaw, Shape::Way, 0.5 * TURN_SIGMA),
+    deviation("along the slide", Coordinate::Along, Shape::InTime, PLACE_SIGMA),
+    deviation("across the slide", Coordinate::Across, Shape::InWay, PLACE_SIGMA),
+    deviation("yaw of the slide", Coordinate::Yaw, Shape::InWay, TURN_SIGMA),
 ];
 
 /// Of an object alone, by the end of its motion: as wide as those of a free slide after a hit, so that a slide still shows
 /// what bends it. One that tumbles is beyond that by many times, which the heavy tails bear.
 pub(super) const ALONE: [Deviation; 5] = [
-    deviation("along the motion", Coordinate::Along, Shape::InTime, PLACE),
-    deviation("across the motion", Coordinate::Across, Shape::InTime, PLACE),
-    deviation("yaw of the motion", Coordinate::Yaw, Shape::InTime, TURN),
-    deviation("roll of the motion", Coordinate::Roll, Shape::InTime, TURN),
-    deviation("pitch of the motion", Coordinate::Pitch, Shape::InTime, TURN),
+    deviation("along the motion", Coordinate::Along, Shape::InTime, PLACE_SIGMA),
+    deviation("across the motion", Coordinate::Across, Shape::InTime, PLACE_SIGMA),
+    deviation("yaw of the motion", Coordinate::Yaw, Shape::InTime, TURN_SIGMA),
+    deviation("roll of the motion", Coordinate::Roll, Shape::InTime, TURN_SIGMA),
+    deviation("pitch of the motion", Coordinate::Pitch, Shape::InTime, TURN_SIGMA),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,13 +155,13 @@ fn direction(series: &ObjectSeries, rows: &[Row]) -> [f64; 2] {
     let Some([first, last]) = span(rows, Part::Slide) else { return [0.0; 2] };
     let way = place(series, last) - place(series, first);
     let length = way.x.hypot(way.y);
-    if length > SHORT { [way.x / length, way.y / length] } else { [0.0; 2] }
+    if length > MIN_WAY { [way.x / length, way.y / length] } else { [0.0; 2] }
 }
 
 /// How far the object is along the straight way between two stamps at a third, or in time where the way is too short.
 fn of_way(series: &ObjectSeries, [first, last]: [u64; 2], stamp_ns: u64) -> f64 {
     let (from, way) = (place(series, first), place(series, last) - place(series, first));
-    if way.norm() > SHORT {
+    if way.norm() > MIN_WAY {
         ((place(series, stamp_ns) - from).dot(&way) / way.norm_squared()).clamp(0.0, 1.0)
     } else {
         of_time([first, last], stamp_ns)

@@ -22,7 +22,7 @@ use twin::replay::object_start;
 use twin::rollout::{CellRollout, CellTrace, Course, ObjectState};
 use twin::scene::ObjectModel;
 
-/// The simulation ends when the object has rested for so many periods and no recorded pose moves any more.
+/// The simulation ends when the object has rested for so many periods [1], a choice, and no recorded pose moves any more.
 const REST_PERIODS: usize = 50;
 
 /// What a simulation of one clip needs.

@@ -31,7 +31,7 @@ use twin::physics::Outline;
 use twin::scene::ObjectModel;
 
 /// The object has been touched once it is so far from where it stood [m]; what an engine's contact sinks in by is less.
-const MOVED: f64 = 1e-4;
+const TOUCHED_MOTION: f64 = 1e-4;
 
 /// Another program, and what it is not asked to change.
 #[derive(Debug, Clone)]
@@ -78,7 +78,7 @@ impl Simulator {
         )?;
         let (joints, poses) = numbers.split_at(times.len() * dof);
         let path = Path { start_ns, poses: poses.chunks_exact(POSE).map(pose).collect() };
-        let moved = |pose: &Isometry3<f64>| (pose.translation.vector - start.translation.vector).norm() > MOVED;
+        let moved = |pose: &Isometry3<f64>| (pose.translation.vector - start.translation.vector).norm() > TOUCHED_MOTION;
         let touched = path.poses.iter().position(moved);
         Ok(Outcome {
             contact_ns: touched.map(|period| start_ns + period as u64 * TICK_NS),

@@ -9,9 +9,9 @@ use twin::arm::{ArmModel, damping_range, stiffness_range};
 use twin::effects::{EffectInfo, Parameter, Robot, Role, Search, Shape, Stage, unknown_weight};
 use twin::scene::ObjectModel;
 
-/// Gains stated by value are searched this far: the values are right to 20 %, and a bound must not be mistaken for them.
+/// Gains stated by value are searched this many times up and down [1]: the values are right to 20 %, and a bound must not be mistaken for them.
 const GAIN_FACTOR: f64 = 2.0;
-/// Difference step of a gain over the gain.
+/// Difference step of a gain over the gain [1]: large against rounding, small against what bends.
 const GAIN_STEP: f64 = 1e-4;
 
 /// Stiffness and damping of every joint, beginning at the base's, and where the masses of the links are not known what their weight
@@ -64,11 +64,11 @@ impl Gain<'_> {
     }
 }
 
-/// Ranges of the object's parameters where cell.toml states none: friction, mass over the nominal one, friction of the tip.
-const FRICTION: Range = [0.02, 1.5];
+/// Ranges of the object's parameters where cell.toml states none: friction, mass over the nominal one, friction of the tip [1]: choices.
+const FRICTION_RANGE: Range = [0.02, 1.5];
 const MASS_FACTOR: f64 = 5.0;
-const TIP_FRICTION: Range = [0.0, 1.0];
-/// The centre of mass lies within this share of the half extents from the centroid.
+const TIP_FRICTION_RANGE: Range = [0.0, 1.0];
+/// The centre of mass lies within this share of the half extents from the centroid [1]: a choice.
 const CENTRE_SHARE: f64 = 0.5;
 
 /// Friction, mass where it was not weighed, centre of mass and, where an arm may touch it, tip friction of the object, beginning at the
@@ -94,7 +94,7 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
         let room = range[1] - range[0];
         unknown(setting, start, range, step.min(0.2 * room).max(1e-3 * room))
     };
-    let frictions = object.friction_range.unwrap_or(FRICTION);
+    let frictions = object.friction_range.unwrap_or(FRICTION_RANGE);
     let mut all = vec![wide(Setting::Friction, friction, frictions, 0.05 * friction.max(0.05))];
     if object.mass.is_none() || object.mass_range.is_some() {
         all.push(wide(Setting::Mass, mass, masses, 0.08 * mass));
@@ -104,14 +104,14 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
         all.push(wide(Setting::CentreOfMass(axis), value, range, 1.5e-3));
     }
     if cell.robot.is_some() {
-        all.push(wide(Setting::TipFriction, tip, object.tip_friction_range.unwrap_or(TIP_FRICTION), 0.06));
+        all.push(wide(Setting::TipFriction, tip, object.tip_friction_range.unwrap_or(TIP_FRICTION_RANGE), 0.06));
     }
     all
 }
 
-/// How far beyond what is plausible an effect is searched, over the width of that range.
+/// How far beyond what is plausible an effect is searched, over the width of that range [1]: a choice.
 const WIDENED: f64 = 0.5;
-/// Difference step over the width of what is plausible.
+/// Difference step over the width of what is plausible [1].
 const EFFECT_STEP: f64 = 2e-3;
 /// The same where hits lie between the number and what is seen, of a tool or of a gear's flanks: over this step their
 /// roughness averages out.
