@@ -282,7 +282,9 @@ fn travel(series: &JointSeries, joint: usize) -> f64 {
 fn dead_joints(clip: &Clip) -> [bool; MAX_JOINTS] {
     std::array::from_fn(|joint| {
         let commanded = travel(&clip.desired, joint);
-        joint < clip.measured.dof && commanded > COMMANDED_MOTION && travel(&clip.measured, joint) < DEAD_SHARE * commanded
+        joint < clip.measured.dof
+            && commanded > COMMANDED_MOTION
+            && travel(&clip.measured, joint) < DEAD_SHARE * commanded
     })
 }
 

@@ -8,8 +8,7 @@ const MEDIAN_ABSOLUTE: f64 = 0.674_49;
 
 /// Least sigma of a logged position [rad]: the quantisation of an encoder of 21 bits a turn, `2 pi / 2^21 / sqrt(12)`, rounded up.
 const POSITION_FLOOR: f64 = 1e-6;
-/// Least sigma of a logged velocity [rad/s]: controllers take it from the same encoders. Of the FR3 it is 50 times that of its positions
-/// (`config/fr3_cell.toml`), which is a filtered difference: plain ones over 1 ms have 1400 times.
+/// Least sigma of a logged velocity [rad/s]: a choice, far below what encoders of that resolution give.
 const VELOCITY_FLOOR: f64 = 1e-6;
 /// Least sigma of a torque [N m]: an FR3's controller (50 to 600 N m/rad, 15 to 50 N m s/rad) makes 0.8 to 3 mN m of its encoders' floors.
 const TORQUE_FLOOR: f64 = 1e-3;

@@ -211,3 +211,151 @@ fn along_a_measured_motion_the_torque_is_what_moves_links_and_overcomes_friction
         }
     }
 }
+
+fn prepared(clip: Clip) -> Result<ArmClip, ArmClipError> {
+    let cell = cell([0.0; 2]);
+    ArmClip::new(clip, &cell, &ArmModel::from_cell(&cell).expect("an arm")).and_then(ArmClip::long_enough)
+}
+
+fn plain() -> Clip {
+    swung(&cell([0.0; 2]), &Theta::default(), true)
+}
+
+#[test]
+fn rows_are_averaged_over_five_milliseconds_and_every_row_counts_once() {
+    let clip = prepared(plain()).expect("usable");
+    assert_eq!(clip.averaged().flatten().copied().collect::<Vec<_>>(), (0..600).collect::<Vec<_>>());
+    assert!(clip.averaged().all(|bin| bin.len() == 5));
+    assert_eq!((clip.runs.len(), clip.alone_until_ns, clip.warnings.len()), (1, u64::MAX, 0));
+    let slow = plain().measured;
+    let every_20_ms = |series: &JointSeries| {
+        let rows = |values: &[f64]| values.chunks(DOF).step_by(20).flatten().copied().collect::<Vec<_>>();
+        let stamps_ns = series.stamps_ns.iter().step_by(20).copied().collect();
+        JointSeries { dof: DOF, stamps_ns, q: rows(&series.q), dq: Vec::new(), tau: Vec::new() }
+    };
+    let slow = prepared(Clip { measured: every_20_ms(&slow), ..plain() }).expect("usable");
+    assert!(slow.averaged().all(|bin| bin.len() == 1), "single rows of slower logs");
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_the_reason() {
+    let cut = |mut clip: Clip, to_ns: u64| {
+        clip.measured = clip.measured.between(0..=to_ns);
+        clip
+    };
+    assert!(matches!(prepared(cut(plain(), 0)), Err(ArmClipError::Empty)));
+    assert!(matches!(prepared(cut(plain(), 300_000_000)), Err(ArmClipError::Short(_))));
+    assert!(matches!(prepared(Clip { desired: JointSeries::default(), ..plain() }), Err(ArmClipError::NoCommands)));
+    let later = |mut series: JointSeries, by_ns: u64| {
+        series.stamps_ns.iter_mut().for_each(|stamp| *stamp += by_ns);
+        series
+    };
+    let apart = Clip { desired: later(plain().desired, 5_000_000_000), ..plain() };
+    assert!(matches!(prepared(apart), Err(ArmClipError::Apart)));
+    let mut slow = plain();
+    slow.measured.stamps_ns.iter_mut().for_each(|stamp| *stamp *= 50);
+    assert!(matches!(prepared(slow), Err(ArmClipError::Slow(rate)) if (rate - 20.0).abs() < 0.1));
+}
+
+#[test]
+fn a_joint_whose_readings_stand_still_has_rows_of_zero_until_its_neighbours_feel_it_move() {
+    let mut clip = plain();
+    let stays = clip.measured.q_row(0)[3];
+    clip.measured.q.iter_mut().skip(3).step_by(DOF).for_each(|q| *q = stays);
+    clip.measured.dq.clear();
+    let (mut arm, left_out) =
+        ArmClips::means(&cell([0.0; 2]), vec![clip], |_: &[f64]| Theta::default()).expect("an arm");
+    assert!(left_out.is_empty() && arm.clip(0).dead[3] && arm.clip(0).stands_still(3));
+    assert!(arm.clip(0).warnings.iter().any(|warning| warning.starts_with("joint 4 `fr3_joint4` does not move")));
+    let of_joint = |arm: &ArmClips<_>| {
+        let rows = residuals(arm, &[]).into_iter().enumerate();
+        largest(rows.filter(|(row, _)| row % DOF == 3).map(|(_, residual)| residual))
+    };
+    assert_eq!(of_joint(&arm), 0.0);
+    arm.settle_dead_joints(&[]);
+    assert!(!arm.clip(0).stands_still(3), "the others feel it");
+    assert_eq!(of_joint(&arm), 0.0);
+    assert!(largest(residuals(&arm, &[])) < 3.0);
+}
+
+#[test]
+fn a_clock_that_jumps_and_a_hole_in_the_commands_split_a_clip() {
+    let mut jumped = plain();
+    jumped.measured.stamps_ns.iter_mut().skip(550).for_each(|stamp| *stamp += 40_000_000);
+    let jumped = prepared(jumped).expect("usable");
+    assert!(
+        jumped.warnings.iter().any(|warning| warning.contains("clock jumps by 0.041 s at 0.549 s")),
+        "{:?}",
+        jumped.warnings
+    );
+    assert!(jumped.rows.iter().all(|row| *row < 550));
+    let mut holed = plain();
+    let (before, after) = (holed.desired.between(0..=49_000_000), holed.desired.between(300_000_000..=u64::MAX));
+    let joined = |a: &[f64], b: &[f64]| [a, b].concat();
+    holed.desired = JointSeries {
+        dof: DOF,
+        stamps_ns: [&before.stamps_ns[..], &after.stamps_ns].concat(),
+        q: joined(&before.q, &after.q),
+        dq: joined(&before.dq, &after.dq),
+        tau: joined(&before.tau, &after.tau),
+    };
+    let cell = cell([0.0; 2]);
+    let model = ArmModel::from_cell(&cell).expect("an arm");
+    let clip = ArmClip::new(holed.clone(), &cell, &model).expect("usable");
+    assert_eq!(clip.runs.iter().map(|run| run.from).collect::<Vec<_>>(), [0, 300]);
+    assert!(clip.averaged().all(|bin| bin[bin.len() - 1] - bin[0] == bin.len() - 1), "no mean over the hole");
+    assert!(clip.warnings.iter().any(|warning| warning.contains("no commands")), "{:?}", clip.warnings);
+    let whole = clip.longest_stretch().expect("a part");
+    assert_eq!(*whole.start(), 300_000_000);
+}
+
+#[test]
+fn moments_are_few_and_begin_where_the_first_velocity_is_forgotten() {
+    let cell = cell([0.0; 2]);
+    let arm = ArmClips::moments(&cell, &[plain()], |_: &[f64]| Theta::default()).expect("an arm");
+    let clip = arm.clip(0);
+    assert!(clip.rows.len() <= 250 && clip.rows.len() > 150, "{}", clip.rows.len());
+    assert!(clip.rows[0] == 80 && clip.rows.is_sorted_by(|a, b| b - a == 3));
+    assert_eq!(clip.asked_ns.len(), 2 * clip.rows.len());
+    assert_eq!(arm.stretches(0), [] as [usize; 0], "a clip is one witness");
+    let mut halted = plain();
+    halted.desired.tau.clear();
+    halted.measured.dq.clear();
+    let arm = ArmClips::moments(&cell, &[halted], |_: &[f64]| Theta::default()).expect("an arm");
+    let quantities: Vec<_> = arm.channels().iter().step_by(DOF).map(|channel| channel.quantity).collect();
+    assert_eq!(quantities, ["q", "tau_J"], "what is logged in every clip");
+}
+
+#[test]
+fn peaks_are_what_the_controller_asks_of_a_loaded_arm_with_gravity() {
+    let cell = cell([0.0; 2]);
+    let recorded = swung(&cell, &loaded(), true);
+    let arm = ArmClips::moments(&cell, std::slice::from_ref(&recorded), |_: &[f64]| loaded()).expect("an arm");
+    let peaks = arm.peaks(&[]).expect("it can be simulated");
+    let model = arm.arm();
+    for joint in 0..DOF {
+        let logged = (80..600).map(|row| {
+            let mut q = [0.0; MAX_JOINTS];
+            q[..DOF].copy_from_slice(recorded.measured.q_row(row));
+            (recorded.desired.tau[row * DOF + joint] + model.gravity(&q)[joint]).abs()
+        });
+        let largest = logged.fold(0.0, f64::max);
+        assert!(
+            (peaks[joint] - largest).abs() < 0.02 * largest.max(1.0),
+            "joint {joint}: {} of {largest}",
+            peaks[joint]
+        );
+    }
+}
+
+#[test]
+fn a_log_without_noise_is_trusted_no_further_than_sensors_can_be() {
+    let cell = cell([0.0; 2]);
+    let arm = ArmClips::moments(&cell, &[plain()], |_: &[f64]| Theta::default()).expect("an arm");
+    for (channel, sigma) in arm.channels().iter().zip(arm.sigma()) {
+        assert!(*sigma >= noise::floor(channel.quantity), "{channel:?}: {sigma}");
+    }
+    assert_eq!(arm.sigma()[0], noise::floor("q"), "a joint that hardly moves");
+    let quantisation = std::f64::consts::TAU / 2.0_f64.powi(21) / 12.0_f64.sqrt();
+    assert!((0.8..1.0).contains(&(quantisation / noise::floor("q"))), "{quantisation} rad");
+}

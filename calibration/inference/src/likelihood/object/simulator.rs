@@ -78,7 +78,8 @@ impl Simulator {
         )?;
         let (joints, poses) = numbers.split_at(times.len() * dof);
         let path = Path { start_ns, poses: poses.chunks_exact(POSE).map(pose).collect() };
-        let moved = |pose: &Isometry3<f64>| (pose.translation.vector - start.translation.vector).norm() > TOUCHED_MOTION;
+        let moved =
+            |pose: &Isometry3<f64>| (pose.translation.vector - start.translation.vector).norm() > TOUCHED_MOTION;
         let touched = path.poses.iter().position(moved);
         Ok(Outcome {
             contact_ns: touched.map(|period| start_ns + period as u64 * TICK_NS),
