@@ -4,8 +4,8 @@
 use super::answer::Identification;
 use inference::estimate::search;
 use inference::estimate::{
-    ClipModel, Evolution, Fit, Found, Impossible, Options, Random, Search, Swarm, Underway, Unknown, begin, fit_from,
-    go_on, minimise,
+    ClipModel, Evolution, Fit, Found, Impossible, Place, Random, Schedule, Search, Swarm, Underway, Unknown, begin,
+    fit_from, go_on, minimise,
 };
 use inference::interrupt::Interrupt;
 use inference::kept::{Fingerprint, Kept};
@@ -41,6 +41,8 @@ impl Optimizer {
     }
 }
 
+/// Most steps with some of the clips, before all are fitted.
+const FIRST: usize = 3;
 /// Linearisations that a fit usually takes: for the bar alone.
 const USUAL_LINEARISATIONS: usize = 4;
 
@@ -111,7 +113,7 @@ impl Run<'_> {
         first: &impl ClipModel,
     ) -> Result<Outcome, RunError> {
         let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
-        let nothing = |clips: usize| vec![vec![0.0; self.random.len()]; clips];
+        let at_rest = |shared, clips| Place::at_rest(shared, self.random, clips);
         let all = Watched { model, watch };
         type Way = (Underway, Vec<[f64; 2]>);
         let (now, way): Way = match self.kept.known(&step("way")) {
@@ -119,18 +121,18 @@ impl Run<'_> {
             None => {
                 let start = if first.clips() < model.clips() {
                     let few = Watched { model: first, watch };
-                    let options = Options { iterations: 3, ..Options::default() };
-                    let from = (start, nothing(first.clips()));
-                    fit_from(&few, self.unknowns, self.random, from, &options, |_, _| !self.interrupt.asked())?.shared
+                    let (from, schedule) = (at_rest(start, first.clips()), Schedule::of(FIRST));
+                    fit_from(&few, self.unknowns, self.random, from, &schedule, |_, _| !self.interrupt.asked())?.shared
                 } else {
                     start
                 };
-                (begin(&all, (self.unknowns, self.random), (start, nothing(model.clips())))?, Vec::new())
+                let start = at_rest(start, model.clips());
+                (begin(&all, (self.unknowns, self.random), &start, &Schedule::default())?, Vec::new())
             }
         };
         watch.already(way.last().map_or(0, |[simulated, _]| *simulated as usize));
         let way = Mutex::new(way);
-        let fit = go_on(&all, (self.unknowns, self.random), now, &Options::default(), |now| {
+        let fit = go_on(&all, (self.unknowns, self.random), now, &Schedule::default(), |now| {
             let mut way = way.lock().expect("no holder panics");
             // Once: what is gone on from stands there already.
             if way.len() < now.fit.history.len() {
@@ -171,15 +173,14 @@ impl Run<'_> {
                 true
             },
         );
-        let own = vec![vec![0.0; self.random.len()]; model.clips()];
-        let once = Options { iterations: 0, ..Options::default() };
+        let best = Place::at_rest(found.numbers, self.random, model.clips());
         let mut simulated = 0;
         let point = |(costs, best): (&Vec<f64>, &f64)| {
             simulated += costs.len() * model.clips();
             [simulated as f64, *best]
         };
         let convergence = so_far.iter().zip(&found.history).map(point).collect();
-        let fit = fit_from(&all, self.unknowns, self.random, (found.numbers, own), &once, |_, _| true)?;
+        let fit = fit_from(&all, self.unknowns, self.random, best, &Schedule::of(0), |_, _| true)?;
         Ok(Outcome { fit, simulated: watch.simulated(), convergence, arrived: found.arrived })
     }
 

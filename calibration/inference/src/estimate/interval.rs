@@ -129,7 +129,7 @@ fn spread(part: &DMatrix<f64>, free: &[usize], n: usize) -> DMatrix<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ClipModel, Impossible, Options, fit};
+    use super::super::{ClipModel, Impossible, Schedule, fit};
     use super::*;
     use rand::{RngExt as _, SeedableRng as _};
     use rand_distr::StandardNormal;
@@ -171,7 +171,7 @@ mod tests {
         let unknown = |name: &str| Unknown { name: name.into(), start: 0.0, lower: -10.0, upper: 10.0, step: 1e-4 };
         let unknowns = [unknown("a"), unknown("b")];
         let inside = |seed| {
-            let fit = fit(&Line::new(seed, lasting), &unknowns, &[], &Options::default(), |_, _| true);
+            let fit = fit(&Line::new(seed, lasting), &unknowns, &[], &Schedule::default(), |_, _| true);
             let fit = fit.expect("an answer");
             let intervals = Intervals::new(&fit, &[false; 2]);
             (0..2).filter(|k| fit.shared[*k].abs() < intervals.half_width[*k]).count() as f64

@@ -1,34 +1,17 @@
-//! Bounded Levenberg-Marquardt over all clips: the default way to find shared numbers, the clips' own ones with them.
+//! Least squares over all clips: the default way to find shared parameters, the clips' nuisance parameters with them.
 
-use super::bounded::bounded_step;
-use super::descent::Descent;
 use super::linear::ClipFit;
 use super::problem::{ClipModel, Impossible, Random, Unknown};
-use super::views::{Counted, Given, Subset};
+use super::solve::{Descent, End, Problem, Quadratic, Schedule, Trial, descend};
+use super::views::Counted;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// When to stop.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
-    /// At most so many linearisations.
-    pub iterations: usize,
-    /// Converged once a step promises to lower the deviance by less than this; 1 is what noise alone moves. Where the
-    /// residuals are larger than their sigmas, what they alone move is larger, and so is this.
-    pub tolerance: f64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { iterations: 20, tolerance: 1e-3 }
-    }
-}
-
-/// The best numbers found, and every clip linearised there.
+/// The best parameters found, and every clip linearised there.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Fit {
-    /// The shared numbers, in the order of the unknowns.
+    /// The shared parameters, in the order of the unknowns.
     pub shared: Vec<f64>,
     /// The clips there.
     pub clips: Vec<ClipFit>,
@@ -38,6 +21,20 @@ pub struct Fit {
     pub evaluations: usize,
     /// Deviance after each linearisation.
     pub history: Vec<f64>,
+}
+
+/// Values of the shared parameters and of every clip's nuisance parameters.
+#[derive(Debug, Clone)]
+pub struct Place {
+    pub shared: Vec<f64>,
+    pub own: Vec<Vec<f64>>,
+}
+
+impl Place {
+    /// Shared parameters with the nuisance parameters of so many clips at rest.
+    pub fn at_rest(shared: Vec<f64>, random: &[Random], clips: usize) -> Self {
+        Self { shared, own: vec![vec![0.0; random.len()]; clips] }
+    }
 }
 
 impl Fit {
@@ -52,20 +49,24 @@ impl Fit {
         (chi2 / rows.max(1) as f64).max(1.0)
     }
 
-    /// Information on the shared numbers from all clips, `P x P`.
+    /// Information on the shared parameters from all clips, `P x P`.
     pub fn information(&self) -> DMatrix<f64> {
         let parts = self.clips.iter().map(|clip| &clip.information);
         parts.fold(DMatrix::zeros(self.shared.len(), self.shared.len()), |sum, part| sum + part)
     }
 
-    pub(super) fn gradient(&self) -> DVector<f64> {
+    fn gradient(&self) -> DVector<f64> {
         self.clips.iter().fold(DVector::zeros(self.shared.len()), |sum, clip| sum + &clip.gradient)
+    }
+
+    fn place(&self) -> Place {
+        Place { shared: self.shared.clone(), own: self.clips.iter().map(|clip| clip.own.clone()).collect() }
     }
 }
 
-/// Finds the shared numbers and every clip's own ones.
+/// Finds the shared parameters and every clip's nuisance parameters.
 ///
-/// `watch` is told every new deviance and the shared numbers there; `false` ends the search with the best so far.
+/// `watch` sees every new deviance and the shared parameters there; `false` ends the search with the best so far.
 ///
 /// # Errors
 /// [`Impossible`] when the model has no answer at the start.
@@ -73,15 +74,14 @@ pub fn fit(
     model: &impl ClipModel,
     unknowns: &[Unknown],
     random: &[Random],
-    options: &Options,
+    schedule: &Schedule,
     watch: impl Fn(f64, &[f64]) -> bool,
 ) -> Result<Fit, Impossible> {
     let shared = unknowns.iter().map(|unknown| unknown.start).collect();
-    let own = vec![vec![0.0; random.len()]; model.clips()];
-    fit_from(model, unknowns, random, (shared, own), options, watch)
+    fit_from(model, unknowns, random, Place::at_rest(shared, random, model.clips()), schedule, watch)
 }
 
-/// The same from another start: the shared numbers and every clip's own ones.
+/// The same from another start.
 ///
 /// # Errors
 /// As [`fit`].
@@ -89,19 +89,19 @@ pub fn fit_from(
     model: &impl ClipModel,
     unknowns: &[Unknown],
     random: &[Random],
-    (shared, own): (Vec<f64>, Vec<Vec<f64>>),
-    options: &Options,
+    start: Place,
+    schedule: &Schedule,
     watch: impl Fn(f64, &[f64]) -> bool,
 ) -> Result<Fit, Impossible> {
-    let now = begin(model, (unknowns, random), (shared, own))?;
-    go_on(model, (unknowns, random), now, options, |now| watch(now.fit.deviance(), &now.fit.shared))
+    let now = begin(model, (unknowns, random), &start, schedule)?;
+    go_on(model, (unknowns, random), now, schedule, |now| watch(now.fit.deviance(), &now.fit.shared))
 }
 
 /// A fit on its way: all that it takes to go on from here as if it had never stopped.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Underway {
-    /// The best numbers so far.
-    pub fit: Fit,
+pub struct Underway<F = Fit> {
+    /// The best parameters so far.
+    pub fit: F,
     damping: f64,
 }
 
@@ -112,13 +112,12 @@ pub struct Underway {
 pub fn begin(
     model: &impl ClipModel,
     (unknowns, random): (&[Unknown], &[Random]),
-    (shared, own): (Vec<f64>, Vec<Vec<f64>>),
+    start: &Place,
+    schedule: &Schedule,
 ) -> Result<Underway, Impossible> {
-    let counted = Counted::new(model);
-    let clips = linearise(&counted, unknowns, random, &shared, &own)?;
-    let mut fit = Fit { shared, clips, converged: false, evaluations: counted.calls(), history: Vec::new() };
-    fit.history.push(fit.deviance());
-    Ok(Underway { fit, damping: 1e-6 })
+    let (model, history, watch) = (Counted::new(model), Vec::new(), |_: &Underway<&Fit>| true);
+    let mut clips = AllClips { model, unknowns, random, before: 0, history, watch };
+    Ok(Underway { fit: clips.linearised(start)?, damping: schedule.damping })
 }
 
 /// A fit from where it is to its end; `watch` sees it before every step.
@@ -128,110 +127,100 @@ pub fn begin(
 pub fn go_on(
     model: &impl ClipModel,
     (unknowns, random): (&[Unknown], &[Random]),
-    mut now: Underway,
-    options: &Options,
-    watch: impl Fn(&Underway) -> bool,
+    now: Underway,
+    schedule: &Schedule,
+    watch: impl Fn(&Underway<&Fit>) -> bool,
 ) -> Result<Fit, Impossible> {
-    let counted = Counted::new(model);
-    let before = now.fit.evaluations;
-    while now.fit.history.len() <= options.iterations {
-        if !watch(&now) {
-            break;
-        }
-        let Underway { fit, damping } = &mut now;
-        let progress = improve(&counted, unknowns, random, fit, damping, options.tolerance)?;
-        fit.evaluations = before + counted.calls();
-        match progress {
-            Progress::Better => fit.history.push(fit.deviance()),
-            Progress::Arrived => {
-                fit.converged = true;
-                break;
-            }
-            Progress::Stuck => break,
-        }
-    }
-    Ok(now.fit)
+    let Underway { fit, damping } = now;
+    let (before, history) = (fit.evaluations, fit.history.clone());
+    // The first linearisation is the start.
+    let iterations = (schedule.iterations + 1).saturating_sub(history.len());
+    let mut clips = AllClips { model: Counted::new(model), unknowns, random, before, history, watch };
+    let mut way = Descent { place: fit.place(), slopes: Some(fit), damping };
+    let end = descend(&mut clips, &mut way, &Schedule { iterations, ..*schedule })?;
+    let fit = match way.slopes {
+        Some(fit) => fit,
+        None => clips.linearised(&way.place)?,
+    };
+    Ok(Fit { converged: end == End::Converged, evaluations: clips.evaluations(), ..fit })
 }
 
-/// Every clip at shared numbers that are given, its own numbers at their best: how clips that were not fitted are judged.
-///
-/// # Errors
-/// [`Impossible`] when the model has no answer there.
-pub fn score(
-    model: &impl ClipModel,
-    shared: &[f64],
-    random: &[Random],
-    options: &Options,
-) -> Result<Vec<ClipFit>, Impossible> {
-    let fixed = Given { model, shared };
-    // Clips do not depend on each other once nothing is shared.
-    let clips: Vec<usize> = (0..model.clips()).collect();
-    clips
-        .into_par_iter()
-        .map(|clip| {
-            let one = Subset { model: &fixed, clips: &[clip] };
-            fit(&one, &[], random, options, |_, _| true).map(|mut fit| fit.clips.swap_remove(0))
-        })
-        .collect()
-}
-
-enum Progress {
-    Better,
-    Arrived,
-    Stuck,
-}
-
-/// Most trials with growing damping before the search is stuck.
-const TRIALS: usize = 12;
-/// So many trials shorten the way of the shared numbers alone; then that of the clips' own ones too.
+/// So many trials shorten the way of the shared parameters alone; then that of the nuisance parameters too.
 const SHARED_TRIALS: usize = 3;
 
-fn improve<M: ClipModel>(
-    model: &Counted<'_, M>,
-    unknowns: &[Unknown],
-    random: &[Random],
-    best: &mut Fit,
-    damping: &mut f64,
-    tolerance: f64,
-) -> Result<Progress, Impossible> {
-    let (information, gradient) = (best.information(), best.gradient());
-    let here = current(best, random);
-    let room: Vec<[f64; 2]> = unknowns.iter().zip(&best.shared).map(|(unknown, at)| unknown.reach(*at)).collect();
-    let whole = bounded_step(&information, &gradient, &room, 0.0);
-    let descent = Descent { information: &information, gradient: &gradient, room: &room, enough: 0.0, trials: TRIALS };
-    if descent.promised(&whole) + own_promise(best) < tolerance * best.misfit() {
-        return Ok(Progress::Arrived);
+struct AllClips<'a, M, W> {
+    model: Counted<'a, M>,
+    unknowns: &'a [Unknown],
+    random: &'a [Random],
+    /// Calls of the model before these.
+    before: usize,
+    history: Vec<f64>,
+    watch: W,
+}
+
+impl<M, W> AllClips<'_, M, W> {
+    fn evaluations(&self) -> usize {
+        self.before + self.model.calls()
     }
-    let held = if unknowns.is_empty() { 0 } else { SHARED_TRIALS };
-    let to = descent.step(damping, |trial, step| {
-        let share = 0.5_f64.powi(i32::try_from(trial.saturating_sub(held)).unwrap_or(i32::MAX));
-        let own: Vec<Vec<f64>> = best.clips.iter().map(|clip| clip.own_part_way(step, share)).collect();
-        let shared: Vec<f64> = (best.shared.iter().zip(unknowns).zip(step.iter()))
+}
+
+impl<M: ClipModel, W: Fn(&Underway<&Fit>) -> bool> Problem for AllClips<'_, M, W> {
+    type Place = Place;
+    type Slopes = Fit;
+
+    fn linearised(&mut self, Place { shared, own }: &Place) -> Result<Fit, Impossible> {
+        let (model, unknowns, random) = (&self.model, self.unknowns, self.random);
+        let at = |clip: usize| ClipFit::at(model, clip, (unknowns, shared), (random, &own[clip]));
+        let clips = (0..model.clips()).into_par_iter().map(at).collect::<Result<_, _>>()?;
+        let evaluations = self.evaluations();
+        let mut fit = Fit { shared: shared.clone(), clips, converged: false, evaluations, history: Vec::new() };
+        self.history.push(fit.deviance());
+        fit.history.clone_from(&self.history);
+        Ok(fit)
+    }
+
+    fn goes_on(&mut self, at: &Fit, damping: f64) -> bool {
+        (self.watch)(&Underway { fit: at, damping })
+    }
+
+    fn quadratic(&self, _: &Place, at: &Fit) -> Result<Quadratic, Impossible> {
+        let cost = |clip: &ClipFit| clip.chi2 + Random::penalty(self.random, &clip.own);
+        Ok(Quadratic {
+            cost: at.clips.iter().map(cost).sum(),
+            information: at.information(),
+            gradient: at.gradient(),
+            room: self.unknowns.iter().zip(&at.shared).map(|(unknown, at)| unknown.reach(*at)).collect(),
+        })
+    }
+
+    fn excess(&self, at: &Fit) -> f64 {
+        at.misfit()
+    }
+
+    /// Measured by how far they go against their covariance.
+    fn promised_besides(&self, at: &Fit) -> f64 {
+        let gain = |clip: &ClipFit| {
+            let way = clip.own_way();
+            clip.own_covariance.clone().cholesky().map_or(0.0, |factor| way.dot(&factor.solve(way)))
+        };
+        at.clips.iter().map(gain).sum()
+    }
+
+    fn stepped(&mut self, from: &Place, at: &Fit, Trial { number, step }: Trial<'_>) -> Option<(Place, f64)> {
+        let held = if self.unknowns.is_empty() { 0 } else { SHARED_TRIALS };
+        let share = 0.5_f64.powi(i32::try_from(number.saturating_sub(held)).unwrap_or(i32::MAX));
+        let own = at.clips.iter().map(|clip| clip.own_part_way(step, share)).collect();
+        let shared = (from.shared.iter().zip(self.unknowns).zip(step.iter()))
             .map(|((value, unknown), step)| (value + step).clamp(unknown.lower, unknown.upper))
             .collect();
-        cost(model, random, &shared, &own).is_some_and(|cost| cost < here).then_some((shared, own))
-    });
-    let Some((shared, own)) = to else { return Ok(Progress::Stuck) };
-    best.clips = linearise(model, unknowns, random, &shared, &own)?;
-    best.shared = shared;
-    Ok(Progress::Better)
+        let to = Place { shared, own };
+        let cost = cost(&self.model, self.random, &to)?;
+        Some((to, cost))
+    }
 }
 
-/// By how much the own numbers lower the deviance by themselves, measured by how far they go against their covariance.
-fn own_promise(best: &Fit) -> f64 {
-    let gain = |clip: &ClipFit| {
-        let way = clip.own_way();
-        clip.own_covariance.clone().cholesky().map_or(0.0, |c| way.dot(&c.solve(way)))
-    };
-    best.clips.iter().map(gain).sum()
-}
-
-fn current(best: &Fit, random: &[Random]) -> f64 {
-    best.clips.iter().map(|clip| clip.chi2 + Random::penalty(random, &clip.own)).sum()
-}
-
-/// Sum of squared residuals and of the own numbers in their sigmas; `None` where the model has no answer.
-fn cost(model: &impl ClipModel, random: &[Random], shared: &[f64], own: &[Vec<f64>]) -> Option<f64> {
+/// Sum of squared residuals and of the nuisance parameters in their sigmas; `None` where the model has no answer.
+fn cost(model: &impl ClipModel, random: &[Random], Place { shared, own }: &Place) -> Option<f64> {
     let costs: Vec<Option<f64>> = (0..model.clips())
         .into_par_iter()
         .map(|clip| {
@@ -244,19 +233,9 @@ fn cost(model: &impl ClipModel, random: &[Random], shared: &[f64], own: &[Vec<f6
     costs.into_iter().sum()
 }
 
-fn linearise(
-    model: &impl ClipModel,
-    unknowns: &[Unknown],
-    random: &[Random],
-    shared: &[f64],
-    own: &[Vec<f64>],
-) -> Result<Vec<ClipFit>, Impossible> {
-    let at = |clip| ClipFit::at(model, clip, (unknowns, shared), (random, &own[clip]));
-    (0..model.clips()).into_par_iter().map(at).collect()
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::profile::score;
     use super::*;
 
     /// `y = a exp(-b t) + u`, with an offset `u` of its own for every clip, in sigmas of 0.01.
@@ -295,7 +274,7 @@ mod tests {
     #[test]
     fn shared_numbers_and_every_clips_own_are_found_together() {
         let model = Decay { offsets: vec![0.1, -0.05, 0.02], a: 2.0, b: 0.7 };
-        let fit = fit(&model, &unknowns(1.0, 0.1), &[OFFSET], &Options::default(), |_, _| true).expect("an answer");
+        let fit = fit(&model, &unknowns(1.0, 0.1), &[OFFSET], &Schedule::default(), |_, _| true).expect("an answer");
         assert!(fit.converged);
         assert!((fit.shared[0] - 2.0).abs() < 2e-3 && (fit.shared[1] - 0.7).abs() < 2e-3, "{:?}", fit.shared);
         for (clip, offset) in fit.clips.iter().zip(&model.offsets) {
@@ -306,22 +285,22 @@ mod tests {
     #[test]
     fn a_number_whose_best_lies_beyond_its_bound_stays_at_the_bound() {
         let model = Decay { offsets: vec![0.0], a: 12.0, b: 0.7 };
-        let fit = fit(&model, &unknowns(1.0, 0.1), &[], &Options::default(), |_, _| true).expect("an answer");
+        let fit = fit(&model, &unknowns(1.0, 0.1), &[], &Schedule::default(), |_, _| true).expect("an answer");
         assert_eq!(fit.shared[0], 10.0);
     }
 
     #[test]
     fn a_fit_that_was_stopped_goes_on_to_the_same_bits() {
         let model = Decay { offsets: vec![0.1, -0.05, 0.02], a: 2.0, b: 0.7 };
-        let (unknowns, random, options) = (unknowns(1.0, 0.1), [OFFSET], Options::default());
+        let (unknowns, random, options) = (unknowns(1.0, 0.1), [OFFSET], Schedule::default());
         let whole = fit(&model, &unknowns, &random, &options, |_, _| true).expect("an answer");
         assert!(whole.history.len() > 4, "{:?}", whole.history);
         for steps in 1..whole.history.len() {
             let stopped = std::cell::RefCell::new(None);
-            let own = vec![vec![0.0]; 3];
-            let start = begin(&model, (&unknowns, &random), (vec![1.0, 0.1], own)).expect("an answer");
-            let told = |now: &Underway| {
-                *stopped.borrow_mut() = Some(now.clone());
+            let start = Place::at_rest(vec![1.0, 0.1], &random, 3);
+            let start = begin(&model, (&unknowns, &random), &start, &options).expect("an answer");
+            let told = |now: &Underway<&Fit>| {
+                *stopped.borrow_mut() = Some(Underway { fit: now.fit.clone(), damping: now.damping });
                 now.fit.history.len() <= steps
             };
             go_on(&model, (&unknowns, &random), start, &options, told).expect("an answer");
@@ -337,7 +316,7 @@ mod tests {
         let model = Decay { offsets: vec![0.1, -0.05, 0.02, 0.0, 0.3], a: 2.0, b: 0.7 };
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            let run = || fit(&model, &unknowns(1.0, 0.1), &[OFFSET], &Options::default(), |_, _| true);
+            let run = || fit(&model, &unknowns(1.0, 0.1), &[OFFSET], &Schedule::default(), |_, _| true);
             pool.install(run).expect("an answer").shared
         };
         assert_eq!(with(1), with(3));
@@ -346,7 +325,7 @@ mod tests {
     #[test]
     fn clips_that_were_not_fitted_are_scored_with_their_own_numbers_at_their_best() {
         let model = Decay { offsets: vec![0.2, -0.1], a: 2.0, b: 0.7 };
-        let clips = score(&model, &[2.0, 0.7], &[OFFSET], &Options::default()).expect("an answer");
+        let clips = score(&model, &[2.0, 0.7], &[OFFSET], &Schedule::default()).expect("an answer");
         assert!((clips[0].own[0] - 0.2).abs() < 1e-3);
         assert!(clips[1].chi2 < 0.1, "{}", clips[1].chi2);
     }

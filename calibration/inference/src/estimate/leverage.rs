@@ -30,7 +30,7 @@ pub fn without_leaning(fit: &mut Fit, held: &[bool]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ClipModel, Impossible, Intervals, Options, Unknown, fit};
+    use super::super::{ClipModel, Impossible, Intervals, Schedule, Unknown, fit};
     use super::*;
 
     /// Means of four clips of one row each: three of sigma 1, and one that is held for a thousand times more exact.
@@ -53,7 +53,7 @@ mod tests {
     fn a_clip_that_the_fit_rests_on_alone_does_not_vouch_for_itself() {
         let unknown = Unknown { name: "a".into(), start: 0.0, lower: -100.0, upper: 100.0, step: 1e-4 };
         let mut found =
-            fit(&Means([1.0, -2.0, 1.5, 6.0]), &[unknown], &[], &Options::default(), |_, _| true).expect("one");
+            fit(&Means([1.0, -2.0, 1.5, 6.0]), &[unknown], &[], &Schedule::default(), |_, _| true).expect("one");
         assert!((found.shared[0] - 6.0).abs() < 1e-3);
         let before = Intervals::new(&found, &[false]).half_width[0];
         without_leaning(&mut found, &[false]);

@@ -10,8 +10,9 @@
 //! | [`eliminate`] | the likelihood of one clip with its own numbers integrated out |
 //! | [`linear`] | one clip linearised by differences |
 //! | [`bounded`] | one damped step within bounds |
-//! | [`descent`] | such steps tried with growing damping until one costs less |
-//! | [`least_squares`] | bounded Levenberg-Marquardt on all clips |
+//! | [`solve`] | the one loop of such steps, and its schedule |
+//! | [`least_squares`] | all clips on that way |
+//! | [`profile`] | nuisance parameters at their best for shared ones that are given |
 //! | [`interval`] | how sure the shared numbers are |
 //! | [`leverage`] | what a clip says of a fit that does not lean on it |
 //! | [`search`] | search without slopes, and its loop |
@@ -24,7 +25,6 @@
 //! but always summed in their order.
 
 pub mod bounded;
-pub mod descent;
 pub mod eliminate;
 pub mod evolution;
 pub mod interval;
@@ -33,20 +33,23 @@ pub mod leverage;
 pub mod linear;
 pub mod plane;
 pub mod problem;
+pub mod profile;
 pub mod sandwich;
 pub mod search;
+pub mod solve;
 pub mod swarm;
 mod views;
 
 pub use bounded::bounded_step;
-pub use descent::Descent;
 pub use eliminate::Eliminated;
 pub use evolution::Evolution;
 pub use interval::{Intervals, at_bounds, moved_by};
-pub use least_squares::{Fit, Options, Underway, begin, fit, fit_from, go_on, score};
+pub use least_squares::{Fit, Place, Underway, begin, fit, fit_from, go_on};
 pub use leverage::without_leaning;
 pub use linear::ClipFit;
 pub use problem::{ClipModel, Impossible, Random, Unknown};
+pub use profile::score;
 pub use search::{Found, Search, minimise};
+pub use solve::Schedule;
 pub use swarm::Swarm;
 pub use views::{Shifted, Subset};

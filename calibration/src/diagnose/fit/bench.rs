@@ -1,6 +1,7 @@
 //! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by the steps of
 //! `descend`.
 
+use super::descend::Reached;
 use super::effort::Effort;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
@@ -158,9 +159,9 @@ impl<E: Likelihood> Bench<'_, E> {
         let clips = self.own_fitted(&full, from, weights)?;
         let clips = self.restarted(&full, clips, weights);
         let before_last = Effort { iterations: effort.iterations.saturating_sub(1), ..effort };
-        let (full, clips, best) = self.descended((full, clips), &moving, weights, before_last)?;
+        let (Reached { full, clips, .. }, last) = self.descended((full, clips), &moving, weights, before_last)?;
         let restarted = self.restarted(&full, clips.clone(), weights);
-        let at = match best.filter(|_| moving.len() == free.len() && restarted == clips) {
+        let at = match last.filter(|_| moving.len() == free.len() && restarted == clips) {
             Some(at) => at,
             None => self.linearise(&full, &free, &restarted, effort.precision)?,
         };
@@ -183,7 +184,8 @@ impl<E: Likelihood> Bench<'_, E> {
         weights: &[f64],
     ) -> Option<(f64, Vec<f64>)> {
         let clips = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
-        let (full, clips, _) = self.descended((full, clips), moving, weights, Effort::of(1, Precision::Joints))?;
+        let effort = Effort::of(1, Precision::Joints);
+        let (Reached { full, clips, .. }, _) = self.descended((full, clips), moving, weights, effort)?;
         Some((self.cost(&full, &clips, weights)?, full))
     }
 

@@ -1,106 +1,58 @@
-//! Bounded Gauss-Newton steps over the sweeps of [`super::sweep`].
+//! Hypotheses on the way down ([`inference::estimate::solve`]) over the sweeps of [`super::sweep`].
 //!
-//! Slopes cost a simulation of all clips for every number, a step costs one. So slopes are kept from step to step, each time
-//! corrected by what the step did (the secant update of Broyden 1965), for as long as steps bring most of what they promise;
-//! then they are taken anew. Converged is only what slopes taken anew say is. Where clips show an object every step takes all of
-//! them: clips then have slopes by numbers of their own, which a step of the shared ones says nothing about, and a hit goes elsewhere
-//! with the least change of the gains.
+//! Slopes cost a simulation of all clips for every parameter, so they are kept from step to step. Where clips show an object every
+//! step takes all of them: clips then have slopes by nuisance parameters, which a step of the shared ones says nothing about, and a hit
+//! goes elsewhere with the least change of the gains.
 
 use super::bench::{Bench, Clips};
 use super::effort::Effort;
 use super::floor;
-use super::sweep::{Reduced, Swept};
-use inference::estimate::Descent;
+use super::sweep::{Precision, Swept};
+use inference::estimate::Impossible;
+use inference::estimate::solve::{Descent, Problem, Quadratic, Schedule, Trial, descend};
 use inference::likelihood::Likelihood;
 use nalgebra::{DMatrix, DVector};
 
-/// A fit has converged when a step promises less than this of the deviance: a fiftieth of a nat decides nothing. Where more is
-/// left than the weights take for noise, chance moves more, and so much more decides nothing.
-const TOLERANCE: f64 = 0.05;
-/// Most trials with growing damping before a point counts as the best there is.
-const TRIALS: usize = 6;
-/// Slopes are kept after a step that brought at least this share of what they promised.
-const BROUGHT: f64 = 0.5;
+/// A fit has converged when a step promises less than 0.05 of the deviance: a fiftieth of a nat decides nothing. Where more is left
+/// than the weights take for noise, chance moves more, and so much more decides nothing.
+const SCHEDULE: Schedule = Schedule { damping: 1e-4, trials: 6, iterations: 0, tolerance: 0.05, secant: Some(0.5) };
 
-/// Where a step led.
-struct Step {
-    full: Vec<f64>,
-    clips: Clips,
-    /// By how much the cost was to fall, and fell.
-    promised: f64,
-    gained: f64,
-    /// Whether numbers were turned round besides: a vector's length is never negative.
+/// Where a hypothesis is.
+pub(super) struct Reached {
+    pub(super) full: Vec<f64>,
+    pub(super) clips: Clips,
+    /// Whether numbers were turned round on the way there: a vector's length is never negative.
     turned_round: bool,
 }
 
+/// A hypothesis of which some numbers move.
+struct Moving<'a, E> {
+    bench: &'a Bench<'a, E>,
+    moving: &'a [usize],
+    weights: &'a [f64],
+    precision: Precision,
+}
+
 impl<E: Likelihood> Bench<'_, E> {
-    /// At most so many damped steps of some numbers and of the clips' own; the last linearisation too, where no step from it was
-    /// worth it. `None` when the twin has no answer at the start.
+    /// At most so many damped steps of some numbers and of the clips' nuisance parameters; the last linearisation too, where no step
+    /// from it was worth it. `None` when the twin has no answer at the start.
     pub(super) fn descended(
         &self,
-        (mut full, mut clips): (Vec<f64>, Clips),
+        (full, clips): (Vec<f64>, Clips),
         moving: &[usize],
         weights: &[f64],
         effort: Effort,
-    ) -> Option<(Vec<f64>, Clips, Option<Swept>)> {
-        let (mut damping, mut kept, mut steps) = (1e-4, None, 0);
-        while steps < effort.iterations && !self.interrupt.asked() {
-            let anew = kept.is_none();
-            let at = match kept.take() {
-                Some(at) => at,
-                None => self.linearise(&full, moving, &clips, effort.precision)?,
-            };
-            let forms = at.reduced(self.evidence, weights).ok()?;
-            let mut damped = damping;
-            let trials = if anew { TRIALS } else { 1 };
-            match self.improved((&full, moving), (&at, &forms), weights, (&mut damped, trials)) {
-                Some(step) => {
-                    steps += 1;
-                    kept = self.corrected(at, (&full, moving), &step);
-                    (full, clips, damping) = (step.full, step.clips, damped);
-                }
-                None if anew => return Some((full, clips, Some(at))),
-                None => {}
-            }
-        }
-        Some((full, clips, None))
-    }
-
-    /// A point with a lower cost, along damped steps; `None` when there is none that is worth it.
-    fn improved(
-        &self,
-        (full, free): (&[f64], &[usize]),
-        (at, forms): (&Swept, &[Reduced]),
-        weights: &[f64],
-        (damping, trials): (&mut f64, usize),
-    ) -> Option<Step> {
-        let size = 1 + free.len();
-        let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, reduced| sum + &reduced.form);
-        let here: Clips = at.clips.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
-        let now = self.cost(full, &here, weights)?;
-        let (information, gradient) = (sum.view((1, 1), (free.len(), free.len())), sum.view((1, 0), (free.len(), 1)));
-        let (information, gradient) = (information.into_owned(), gradient.column(0).into_owned());
-        let room: Vec<[f64; 2]> = free.iter().map(|k| self.library.unknowns[*k].reach(full[*k])).collect();
-        let enough = TOLERANCE * self.excess(at, weights);
-        let descent = Descent { information: &information, gradient: &gradient, room: &room, enough, trials };
-        descent.step(damping, |_, step| {
-            let mut to = full.to_vec();
-            free.iter().zip(step.iter()).for_each(|(k, step)| to[*k] += step);
-            let straight = to.clone();
-            self.library.turn_round(&mut to);
-            let own = |clip: &super::sweep::SweptClip| {
-                Some((clip.clip, at.own_after(clip, self.evidence, weights, step).ok()?))
-            };
-            let to_own = self.own_fitted(&to, at.clips.iter().map(own).collect::<Option<_>>()?, weights)?;
-            let clips = self.restarted(&to, to_own, weights);
-            let cost = self.cost(&to, &clips, weights).filter(|cost| *cost < now)?;
-            let (promised, gained, turned_round) = (descent.promised(step), now - cost, to != straight);
-            Some(Step { full: to, clips, promised, gained, turned_round })
-        })
+    ) -> Option<(Reached, Option<Swept>)> {
+        let schedule = Schedule { iterations: effort.iterations, ..SCHEDULE };
+        let mut hypothesis = Moving { bench: self, moving, weights, precision: effort.precision };
+        let place = Reached { full, clips, turned_round: false };
+        let mut way = Descent { place, slopes: None, damping: schedule.damping };
+        descend(&mut hypothesis, &mut way, &schedule).ok()?;
+        Some((way.place, way.slopes))
     }
 
     /// How many times what the clips of an arm leave exceeds what the weights take for noise, at least 1: so many times more does
-    /// chance move of the deviance. Clips with numbers of their own take that up.
+    /// chance move of the deviance. Clips with nuisance parameters take that up.
     fn excess(&self, at: &Swept, weights: &[f64]) -> f64 {
         if self.evidence.has_object() {
             return 1.0;
@@ -112,21 +64,71 @@ impl<E: Likelihood> Bench<'_, E> {
         let ratios: Vec<f64> = counts.map(|(taken, found)| (taken / found).powi(2)).collect();
         (ratios.iter().sum::<f64>() / ratios.len().max(1) as f64).max(1.0)
     }
+}
 
-    /// A linearisation moved to where a step led, its slopes corrected by what the step did: by the least that makes them right
-    /// along it, numbers in their steps. `None` where they are to be taken anew.
-    fn corrected(&self, mut at: Swept, (from, free): (&[f64], &[usize]), step: &Step) -> Option<Swept> {
-        if self.evidence.has_object() || step.turned_round || step.gained < BROUGHT * step.promised {
+fn no_answer() -> Impossible {
+    Impossible("the twin has no answer at these parameters".into())
+}
+
+impl<E: Likelihood> Problem for Moving<'_, E> {
+    type Place = Reached;
+    type Slopes = Swept;
+
+    fn linearised(&mut self, place: &Reached) -> Result<Swept, Impossible> {
+        self.bench.linearise(&place.full, self.moving, &place.clips, self.precision).ok_or_else(no_answer)
+    }
+
+    fn goes_on(&mut self, _: &Swept, _: f64) -> bool {
+        !self.bench.interrupt.asked()
+    }
+
+    fn quadratic(&self, place: &Reached, at: &Swept) -> Result<Quadratic, Impossible> {
+        let free = self.moving.len();
+        let forms = at.reduced(self.bench.evidence, self.weights)?;
+        let sum = forms.iter().fold(DMatrix::zeros(1 + free, 1 + free), |sum, reduced| sum + &reduced.form);
+        let room = self.moving.iter().map(|k| self.bench.library.unknowns[*k].reach(place.full[*k]));
+        Ok(Quadratic {
+            cost: self.bench.cost(&place.full, &place.clips, self.weights).ok_or_else(no_answer)?,
+            information: sum.view((1, 1), (free, free)).into_owned(),
+            gradient: sum.view((1, 0), (free, 1)).column(0).into_owned(),
+            room: room.collect(),
+        })
+    }
+
+    fn excess(&self, at: &Swept) -> f64 {
+        self.bench.excess(at, self.weights)
+    }
+
+    fn stepped(&mut self, from: &Reached, at: &Swept, trial: Trial<'_>) -> Option<(Reached, f64)> {
+        let (bench, weights) = (self.bench, self.weights);
+        let mut full = from.full.clone();
+        self.moving.iter().zip(trial.step.iter()).for_each(|(k, step)| full[*k] += step);
+        let straight = full.clone();
+        bench.library.turn_round(&mut full);
+        let own = |clip: &super::sweep::SweptClip| {
+            Some((clip.clip, at.own_after(clip, bench.evidence, weights, trial.step).ok()?))
+        };
+        let clips = bench.own_fitted(&full, at.clips.iter().map(own).collect::<Option<_>>()?, weights)?;
+        let clips = bench.restarted(&full, clips, weights);
+        let cost = bench.cost(&full, &clips, weights)?;
+        let turned_round = full != straight;
+        Some((Reached { full, clips, turned_round }, cost))
+    }
+
+    /// By the least that makes the slopes right along the step, numbers in their steps.
+    fn corrected(&self, mut at: Swept, from: &Reached, to: &Reached) -> Option<Swept> {
+        let Self { bench, moving, .. } = self;
+        if bench.evidence.has_object() || to.turned_round {
             return None;
         }
-        let way = DVector::from_iterator(free.len(), free.iter().map(|k| step.full[*k] - from[*k]));
-        let units: Vec<f64> = free.iter().map(|k| self.library.unknowns[*k].step).collect();
+        let way = DVector::from_iterator(moving.len(), moving.iter().map(|k| to.full[*k] - from.full[*k]));
+        let units: Vec<f64> = moving.iter().map(|k| bench.library.unknowns[*k].step).collect();
         let square: f64 = way.iter().zip(&units).map(|(way, unit)| (way / unit).powi(2)).sum();
         for clip in &mut at.clips {
             let mut there = Vec::new();
-            self.evidence.residuals(clip.clip, &step.full, &clip.own, &mut there).ok()?;
+            bench.evidence.residuals(clip.clip, &to.full, &clip.own, &mut there).ok()?;
             let there = DVector::from_vec(there);
-            let missed = &there - clip.matrix.column(0) - clip.matrix.columns(1, free.len()) * &way;
+            let missed = &there - clip.matrix.column(0) - clip.matrix.columns(1, moving.len()) * &way;
             for (k, (way, unit)) in way.iter().zip(&units).enumerate() {
                 clip.matrix.column_mut(1 + k).axpy(way / (square * unit * unit), &missed, 1.0);
             }
@@ -139,10 +141,10 @@ impl<E: Likelihood> Bench<'_, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::fit::sweep::Precision;
+
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{bench, shipped};
-    use inference::estimate::{ClipModel, Impossible};
+    use inference::estimate::ClipModel;
     use inference::interrupt::Interrupt;
     use inference::likelihood::random_effects::{RandomEffects, WithOwn};
     use inference::likelihood::setting;

@@ -5,7 +5,10 @@ use super::{ArmError, Model};
 use crate::identify::answer::{ClipGap, Figures, Gap, Identification};
 use crate::identify::run::RunError;
 use crate::page::Trace;
-use inference::estimate::{Options, Random, Subset, score};
+use inference::estimate::Random;
+use inference::estimate::Subset;
+use inference::estimate::score;
+use inference::estimate::Schedule;
 use rayon::prelude::*;
 
 /// Points of a picture's line.
@@ -104,7 +107,7 @@ fn one(
 fn errors(model: &Model<'_>, clip: usize, random: &[Random], numbers: &[f64]) -> Result<Errors, RunError> {
     let own = if random.iter().any(|effect| effect.sigma > 0.0) {
         let alone = Subset { model, clips: &[clip] };
-        score(&alone, numbers, random, &Options::default())?.swap_remove(0).own
+        score(&alone, numbers, random, &Schedule::default())?.swap_remove(0).own
     } else {
         Vec::new()
     };

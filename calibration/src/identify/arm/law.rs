@@ -1,8 +1,12 @@
 //! Which control law leads the arm, where cell.toml does not say: gains are fitted under each law, and the one that leaves the least of
 //! the joints' motion is taken.
 
-use super::{ArmError, Numbers, begun};
-use inference::estimate::{ClipModel as _, Options as FitOptions, fit};
+use super::ArmError;
+use super::Numbers;
+use super::begun;
+use inference::estimate::ClipModel as _;
+use inference::estimate::fit;
+use inference::estimate::Schedule;
 use inference::interrupt::Interrupt;
 use inference::likelihood::Settings;
 use inference::likelihood::arm::ArmClips;
@@ -73,7 +77,7 @@ fn left_under(
     if model.clips() == 0 {
         return Ok(None);
     }
-    let found = fit(&model, &unknowns, &model.random(), &FitOptions::default(), |_, _| !interrupt.asked());
+    let found = fit(&model, &unknowns, &model.random(), &Schedule::default(), |_, _| !interrupt.asked());
     Ok(found.ok().map(|found| found.misfit().sqrt()))
 }
 

@@ -4,7 +4,12 @@
 use super::Model;
 use super::session::joint_of;
 use super::start::costs;
-use inference::estimate::{ClipModel, Fit, Options, Subset, Unknown, fit};
+use inference::estimate::ClipModel;
+use inference::estimate::Fit;
+use inference::estimate::Subset;
+use inference::estimate::Unknown;
+use inference::estimate::fit;
+use inference::estimate::Schedule;
 use inference::interrupt::Interrupt;
 use inference::likelihood::Setting;
 use rayon::prelude::*;
@@ -82,8 +87,8 @@ fn bring_near(
         None => unknown.clone(),
     });
     let without: Vec<Unknown> = without.collect();
-    let options = Options { iterations: ROUGH, ..Options::default() };
-    let rough = fit(&Subset { model, clips }, &without, &model.random(), &options, |_, _| !interrupt.asked());
+    let schedule = Schedule::of(ROUGH);
+    let rough = fit(&Subset { model, clips }, &without, &model.random(), &schedule, |_, _| !interrupt.asked());
     // Where the twin cannot be simulated the search itself says so.
     for (unknown, near) in unknowns.iter_mut().zip(rough.map(|fit| fit.shared).unwrap_or_default()) {
         unknown.start = near;

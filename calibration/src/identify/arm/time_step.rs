@@ -57,10 +57,12 @@ mod tests {
     use crate::benchmark::session::record;
     use crate::benchmark::world::{Fault, Kind, World};
     use crate::identify::arm::Numbers;
-    use inference::estimate::{Options, fit};
+    use inference::estimate::fit;
     use inference::likelihood::Settings;
     use inference::likelihood::arm::ArmClips;
-    use inference::likelihood::setting::{arm_numbers, complete};
+    use inference::likelihood::setting::arm_numbers;
+    use inference::likelihood::setting::complete;
+    use inference::estimate::Schedule;
     use shared_mem::cell::Cell;
     use std::path::Path;
 
@@ -90,7 +92,7 @@ mod tests {
         }
         (measured.tau, clips[0].desired.tau) = (Vec::new(), Vec::new());
         let (model, random) = (model(clips), Vec::new());
-        let mut found = fit(&model, &unknowns, &random, &Options::default(), |_, _| true).expect("an answer");
+        let mut found = fit(&model, &unknowns, &random, &Schedule::default(), |_, _| true).expect("an answer");
         let off = |shared: &[f64]| {
             let off = shared.iter().zip(&truth).map(|(found, truth)| (found / truth - 1.0).powi(2)).sum::<f64>();
             (off / truth.len() as f64).sqrt()

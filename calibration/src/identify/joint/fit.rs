@@ -3,7 +3,7 @@
 use super::model::{Motion, Motions, best_fit};
 use super::noise::Noise;
 use inference::estimate::interval::LEVEL;
-use inference::estimate::{ClipFit, Fit, Intervals, Options, Unknown, score};
+use inference::estimate::{ClipFit, Fit, Intervals, Schedule, Unknown, score};
 use inference::statistics::student;
 
 /// A number is not identifiable if its interval, to either side, is more than this share of what slows the part in all: the other may
@@ -92,7 +92,7 @@ impl Found {
 
 /// Every motion with given numbers, its own start at its best.
 pub(super) fn scored(motions: &[Motion], numbers: [f64; 2]) -> Option<Vec<ClipFit>> {
-    score(&Motions(motions), &numbers, &Motions::own(), &Options::default()).ok()
+    score(&Motions(motions), &numbers, &Motions::own(), &Schedule::default()).ok()
 }
 
 /// Every motion with what the others say; nothing where there is only one.

@@ -2,7 +2,7 @@
 //!
 //! Each motion has its own start, position and velocity, which its rows alone say: eliminated with priors so wide that they say nothing.
 
-use inference::estimate::{ClipModel, Fit, Impossible, Options, Random, Unknown, fit_from};
+use inference::estimate::{ClipModel, Fit, Impossible, Place, Random, Schedule, Unknown, fit_from};
 use twin::world::LoneJoint;
 
 /// One sigma of a motion's own start, in those of its noise.
@@ -151,8 +151,8 @@ pub(super) fn best_fit(motions: &[Motion]) -> Option<Fit> {
     let unknowns = model.unknowns();
     let fits = [[1.0, 0.1], [0.1, 1.0]].iter().filter_map(|shares| {
         let start = unknowns.iter().zip(shares).map(|(unknown, share)| unknown.start * share).collect();
-        let rest = vec![vec![0.0; own.len()]; motions.len()];
-        fit_from(&model, &unknowns, &own, (start, rest), &Options::default(), |_, _| true).ok()
+        let start = Place::at_rest(start, &own, motions.len());
+        fit_from(&model, &unknowns, &own, start, &Schedule::default(), |_, _| true).ok()
     });
     fits.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))
 }

@@ -41,7 +41,10 @@ use super::run::{Optimizer, Outcome, Run, RunError, concluded};
 use finding::Finding;
 use fit::{ObjectFit, fit_object, linearise_object};
 use inference::engine::{Engine, EngineError, Used};
-use inference::estimate::{Impossible, Options as FitOptions, Unknown, fit as fit_clips};
+use inference::estimate::Impossible;
+use inference::estimate::Unknown;
+use inference::estimate::fit as fit_clips;
+use inference::estimate::Schedule;
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept};
 use inference::likelihood::arm::ArmClips;
@@ -333,6 +336,6 @@ fn with_gains(
     let settings = Settings::new(base, settings);
     let (clips, _) = ArmClips::means(cell, clips, |numbers: &[f64]| settings.theta(numbers))?;
     let clips = clips.moved_by(engine, &complete(cell, None)?);
-    let fit = fit_clips(&clips, &unknowns, &clips.random(), &FitOptions::default(), |_, _| !interrupt.asked())?;
+    let fit = fit_clips(&clips, &unknowns, &clips.random(), &Schedule::default(), |_, _| !interrupt.asked())?;
     Ok(Theta { arm: settings.theta(&fit.shared).arm, ..given.clone() })
 }

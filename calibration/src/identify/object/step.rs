@@ -4,11 +4,24 @@
 //! elsewhere than simulated finds its own way first. A clip that nothing fits counts less, so that it does not steer
 //! the others.
 
-use inference::estimate::{
-    ClipFit, ClipModel, Descent, Fit, Impossible, Intervals, Options, Random, Unknown, at_bounds, fit_from,
-    without_leaning,
-};
+use inference::estimate::ClipFit;
+use inference::estimate::Fit;
+use inference::estimate::Impossible;
+use inference::estimate::Intervals;
+use inference::estimate::Random;
+use inference::estimate::Unknown;
+use inference::estimate::at_bounds;
+use inference::estimate::without_leaning;
 use inference::likelihood::object::ObjectClips;
+use inference::estimate::profile::Profile;
+use inference::estimate::profile::profiled;
+use inference::estimate::solve::Descent;
+use inference::estimate::solve::End;
+use inference::estimate::solve::Problem;
+use inference::estimate::solve::Quadratic;
+use inference::estimate::solve::Schedule;
+use inference::estimate::solve::Trial;
+use inference::estimate::solve::descend;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -40,14 +53,10 @@ pub(super) struct Linearised {
 
 /// How much wider an interval may get by a look at the deviance.
 const WIDEST: f64 = 6.0;
-/// Steps of the own numbers at most.
-const OWN: Options = Options { iterations: 2, tolerance: 0.3 };
-/// Damping of the first trial: a hit is rough, and a whole step seldom leads down.
-const DAMPING: f64 = 1e-3;
-/// Trials with growing damping.
-const TRIALS: usize = 5;
-/// A step is small when it promises less than this [nats of -2 ln likelihood].
-const SMALL: f64 = 0.3;
+/// How nuisance parameters come to their best.
+const OWN: Schedule = Schedule { damping: 1e-6, trials: 12, iterations: 2, tolerance: 0.3, secant: None };
+/// One step of the shared ones. Much damping: a hit is rough, and a whole step seldom leads down.
+const STEP: Schedule = Schedule { damping: 1e-3, trials: 5, iterations: 1, tolerance: 0.3, secant: None };
 /// A clip counts less from so many times the usual misfit on.
 const MISFIT: f64 = 4.0;
 
@@ -92,61 +101,21 @@ impl Linearised {
     }
 }
 
-/// One clip at shared numbers that are given.
-struct OneClip<'a> {
-    clips: &'a ObjectClips,
-    clip: usize,
-    shared: &'a [f64],
-}
-
-impl ClipModel for OneClip<'_> {
-    fn clips(&self) -> usize {
-        1
-    }
-
-    fn residuals(&self, _: usize, _: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        self.clips.residuals(self.clip, self.shared, own, out)
-    }
-
-    fn stepped(
-        &self,
-        _: usize,
-        (_, own): (&[f64], &[f64]),
-        ((_, from), base): ((&[f64], &[f64]), &[f64]),
-        out: &mut Vec<f64>,
-    ) -> Result<(), Impossible> {
-        self.clips.stepped(self.clip, (self.shared, own), ((self.shared, from), base), out)
-    }
-}
-
-/// Own numbers at their best, their cost, calls of the model.
-type Profiled = (Vec<f64>, f64, usize);
-
 impl Question<'_> {
     /// The clips linearised after one step from `shared` with `own`; where no step leads down, there.
     ///
     /// # Errors
     /// [`Impossible`] when a clip cannot be simulated there.
     pub(super) fn improved(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
-        let here = self.profiled(shared, own)?;
-        let at = self.linearised(shared, &here)?;
-        let (information, gradient, cost) = (at.information(), at.gradient(), weighted(&here, &at.weights));
-        let room: Vec<[f64; 2]> = self.unknowns.iter().zip(shared).map(|(unknown, at)| unknown.room(*at)).collect();
-        let descent =
-            Descent { information: &information, gradient: &gradient, room: &room, enough: SMALL, trials: TRIALS };
-        let start: Vec<Vec<f64>> = here.iter().map(|(own, ..)| own.clone()).collect();
-        let mut evaluations = at.evaluations;
-        let mut damping = DAMPING;
-        let found = descent.step(&mut damping, |_, step| {
-            let to: Vec<f64> = shared.iter().zip(step.iter()).map(|(x, dx)| x + dx).collect();
-            let there = self.profiled(&to, &start).ok()?;
-            evaluations += there.iter().map(|(.., calls)| calls).sum::<usize>();
-            (weighted(&there, &at.weights) < cost).then_some((to, there))
-        });
-        let Some((to, there)) = found else { return Ok(Linearised { small: true, evaluations, ..at }) };
-        let mut after = self.linearised(&to, &there)?;
-        after.evaluations += evaluations;
-        Ok(after)
+        let mut strokes = Strokes { question: *self, evaluations: 0 };
+        let place = strokes.profiled(shared, own)?;
+        let mut way = Descent { place, slopes: None, damping: STEP.damping };
+        let end = descend(&mut strokes, &mut way, &STEP)?;
+        let at = match way.slopes {
+            Some(at) => at,
+            None => strokes.linearised(&way.place)?,
+        };
+        Ok(Linearised { small: end != End::Stopped, evaluations: strokes.evaluations, ..at })
     }
 
     /// The clips linearised at `shared`, own numbers at their best.
@@ -154,7 +123,10 @@ impl Question<'_> {
     /// # Errors
     /// As [`Self::improved`].
     pub(super) fn here(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
-        self.linearised(shared, &self.profiled(shared, own)?)
+        let mut strokes = Strokes { question: *self, evaluations: 0 };
+        let place = strokes.profiled(shared, own)?;
+        let at = strokes.linearised(&place)?;
+        Ok(Linearised { evaluations: strokes.evaluations, ..at })
     }
 
     /// By how much wider than slopes say the clips leave each number, 1 to [`WIDEST`]: the deviance is looked at where the
@@ -165,10 +137,10 @@ impl Question<'_> {
     /// As [`Self::improved`].
     pub(super) fn widths(&self, at: &Linearised, half: &[f64]) -> Result<(Vec<f64>, usize), Impossible> {
         let n = at.shared.len();
-        let (own, mut evaluations) = (at.own(), 0);
+        let (own, mut strokes) = (at.own(), Strokes { question: *self, evaluations: 0 });
         let information = at.information();
         let Some(covariance) = information.clone().try_inverse() else { return Ok((vec![1.0; n], 0)) };
-        let here = weighted(&self.profiled(&at.shared, &own)?, &at.weights);
+        let here = strokes.profiled(&at.shared, &own)?.cost(self.random, &at.weights);
         let mut widths = vec![1.0; n];
         let looked_at = |k: &usize| covariance[(*k, *k)] > 0.0 && half[*k].is_finite();
         for (k, width) in widths.iter_mut().enumerate().filter(|(k, _)| looked_at(k)) {
@@ -178,43 +150,81 @@ impl Question<'_> {
                 let inside =
                     |j: usize| (at.shared[j] + side * way[j]).clamp(self.unknowns[j].lower, self.unknowns[j].upper);
                 let to: Vec<f64> = (0..n).map(inside).collect();
-                if let Ok(there) = self.profiled(&to, &own) {
-                    evaluations += there.iter().map(|(.., calls)| calls).sum::<usize>();
+                if let Ok(there) = strokes.profiled(&to, &own) {
                     let moved = DVector::from_fn(n, |j, _| to[j] - at.shared[j]);
                     promised += moved.dot(&(&information * &moved));
-                    risen += weighted(&there, &at.weights) - here;
+                    risen += there.cost(self.random, &at.weights) - here;
                 }
             }
             // Both sides together: one alone may fall by chance where the hit is rough.
             *width = (promised / risen.max(1e-9)).sqrt().clamp(1.0, WIDEST);
         }
-        Ok((widths, evaluations))
-    }
-
-    fn profiled(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Vec<Profiled>, Impossible> {
-        let one = |(clip, own): (usize, &Vec<f64>)| {
-            let model = OneClip { clips: self.clips, clip, shared };
-            let fit = fit_from(&model, &[], self.random, (Vec::new(), vec![own.clone()]), &OWN, |_, _| true)?;
-            let [clip] = &fit.clips[..] else { return Err(Impossible("no clip".into())) };
-            Ok((clip.own.clone(), clip.chi2 + Random::penalty(self.random, &clip.own), fit.evaluations))
-        };
-        own.par_iter().enumerate().map(one).collect()
-    }
-
-    fn linearised(&self, shared: &[f64], at: &[Profiled]) -> Result<Linearised, Impossible> {
-        let one = |(clip, (own, ..)): (usize, &Profiled)| {
-            ClipFit::at(self.clips, clip, (self.unknowns, shared), (self.random, own))
-        };
-        let clips: Vec<ClipFit> = at.par_iter().enumerate().map(one).collect::<Result<_, _>>()?;
-        let each = 1 + self.unknowns.len() + self.random.iter().filter(|effect| effect.sigma > 0.0).count();
-        let evaluations = at.iter().map(|(.., calls)| calls + each).sum();
-        let weights = weights(&clips);
-        Ok(Linearised { shared: shared.to_vec(), clips, weights, small: false, evaluations })
+        Ok((widths, strokes.evaluations))
     }
 }
 
-fn weighted(clips: &[Profiled], weights: &[f64]) -> f64 {
-    clips.iter().zip(weights).map(|((_, cost, _), weight)| cost * weight).sum()
+/// Shared parameters, and every clip with its nuisance parameters at their best.
+struct Place {
+    shared: Vec<f64>,
+    clips: Vec<Profile>,
+}
+
+impl Place {
+    /// What the clips cost, each as much as it counts.
+    fn cost(&self, random: &[Random], weights: &[f64]) -> f64 {
+        let cost = |clip: &ClipFit| clip.chi2 + Random::penalty(random, &clip.own);
+        self.clips.iter().zip(weights).map(|(profile, weight)| cost(&profile.clip) * weight).sum()
+    }
+}
+
+/// The clips of a question on their way down.
+struct Strokes<'a> {
+    question: Question<'a>,
+    /// Calls of the model.
+    evaluations: usize,
+}
+
+impl Strokes<'_> {
+    fn profiled(&mut self, shared: &[f64], own: &[Vec<f64>]) -> Result<Place, Impossible> {
+        let Question { clips, random, .. } = self.question;
+        let clips = profiled(clips, shared, random, own, &OWN)?;
+        self.evaluations += clips.iter().map(|profile| profile.evaluations).sum::<usize>();
+        Ok(Place { shared: shared.to_vec(), clips })
+    }
+}
+
+impl Problem for Strokes<'_> {
+    type Place = Place;
+    type Slopes = Linearised;
+
+    fn linearised(&mut self, place: &Place) -> Result<Linearised, Impossible> {
+        let Question { clips, unknowns, random } = self.question;
+        let one = |(clip, profile): (usize, &Profile)| {
+            ClipFit::at(clips, clip, (unknowns, &place.shared), (random, &profile.clip.own))
+        };
+        let clips: Vec<ClipFit> = place.clips.par_iter().enumerate().map(one).collect::<Result<_, _>>()?;
+        let each = 1 + unknowns.len() + random.iter().filter(|effect| effect.sigma > 0.0).count();
+        self.evaluations += clips.len() * each;
+        let weights = weights(&clips);
+        Ok(Linearised { shared: place.shared.clone(), clips, weights, small: false, evaluations: 0 })
+    }
+
+    fn quadratic(&self, place: &Place, at: &Linearised) -> Result<Quadratic, Impossible> {
+        let Question { unknowns, random, .. } = self.question;
+        Ok(Quadratic {
+            cost: place.cost(random, &at.weights),
+            information: at.information(),
+            gradient: at.gradient(),
+            room: unknowns.iter().zip(&place.shared).map(|(unknown, at)| unknown.room(*at)).collect(),
+        })
+    }
+
+    fn stepped(&mut self, from: &Place, at: &Linearised, trial: Trial<'_>) -> Option<(Place, f64)> {
+        let to: Vec<f64> = from.shared.iter().zip(trial.step.iter()).map(|(x, dx)| x + dx).collect();
+        let there = self.profiled(&to, &at.own()).ok()?;
+        let cost = there.cost(self.question.random, &at.weights);
+        Some((there, cost))
+    }
 }
 
 /// 1 for clips whose misfit is usual, in inverse proportion to it beyond.
