@@ -10,11 +10,11 @@ use super::score::Said;
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
-use crate::diagnose::fit::quadratic::minimum;
 use crate::diagnose::fit::shortlist;
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use inference::likelihood::Evidence;
 use inference::likelihood::random_effects::RandomEffects;
+use inference::estimate::quadratic::minimum;
 use nalgebra::DMatrix;
 
 /// Names in the order of [`all`].

@@ -13,6 +13,7 @@
 //! | [`solve`] | the one loop of such steps, and its schedule |
 //! | [`least_squares`] | all clips on that way |
 //! | [`profile`] | nuisance parameters at their best for shared ones that are given |
+//! | [`quadratic`] | quadratic forms in parameters: minima over chosen ones, elimination of others |
 //! | [`interval`] | how sure the shared numbers are |
 //! | [`leverage`] | what a clip says of a fit that does not lean on it |
 //! | [`search`] | search without slopes, and its loop |
@@ -34,6 +35,7 @@ pub mod linear;
 pub mod plane;
 pub mod problem;
 pub mod profile;
+pub mod quadratic;
 pub mod sandwich;
 pub mod search;
 pub mod solve;

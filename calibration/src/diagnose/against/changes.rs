@@ -9,9 +9,10 @@ use super::answer::Values;
 use super::fits::{Fitted, PairBench};
 use super::subjects::Subject;
 use super::turned::{Acts, Side, Turned};
-use crate::diagnose::fit::quadratic::minimum;
+
 use crate::page::UNBOUNDED;
 use inference::likelihood::Evidence;
+use inference::estimate::quadratic::minimum;
 use inference::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;

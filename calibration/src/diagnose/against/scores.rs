@@ -10,10 +10,10 @@ use super::subjects::Subject;
 use super::turned::{Acts, Model, SIDES, Side, side_of};
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::floor;
-use crate::diagnose::fit::quadratic::{bounded_minimum, eliminate, minimum};
 use crate::diagnose::fit::shortlist::{Scored, chance};
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use inference::likelihood::Evidence;
+use inference::estimate::quadratic::{bounded_minimum, eliminate, minimum};
 use inference::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 

@@ -4,13 +4,13 @@
 //! Sensors are white, but a twin is never exact: what is left is larger than the sensor's noise and says the same thing
 //! many times over. Taken at face value it would make any two hypotheses differ by thousands of nats.
 
-use super::quadratic::minimum;
 use super::shortlist;
 use super::sweep::{Column, Swept};
 use crate::diagnose::library::Library;
 use inference::estimate::Impossible;
 use inference::likelihood::arm::noise::correlation_length;
 use inference::likelihood::{Channel, Group, Likelihood};
+use inference::estimate::quadratic::minimum;
 use inference::statistics::median;
 use nalgebra::{DMatrix, DVector};
 

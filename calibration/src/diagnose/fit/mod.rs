@@ -2,7 +2,7 @@
 //!
 //! | module | |
 //! |---|---|
-//! | `sweep`, `quadratic` | clips linearised by numbers and probes of candidates, and the quadratic forms that come of it |
+//! | `sweep` | clips linearised by numbers and probes of candidates |
 //! | `floor` | weights of the channels: how far residuals can be trusted |
 //! | `shortlist` | how much of the gap each candidate's signature explains |
 //! | `anchored` | strokes of another program around one point, with the twin's differences |
@@ -22,7 +22,6 @@ pub mod effort;
 pub mod floor;
 pub(super) mod left_out;
 pub mod parameters;
-pub mod quadratic;
 pub mod restart;
 pub mod shortlist;
 pub(super) mod stages;

@@ -8,10 +8,11 @@
 //! possible.
 
 use super::bench::{Bench, Hypothesis};
-use super::quadratic::minimum;
+
 use crate::page::{Size, UNBOUNDED};
 use inference::likelihood::Evidence;
 use inference::likelihood::setting::Setting;
+use inference::estimate::quadratic::minimum;
 use inference::statistics::student_sigmas;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;

@@ -1,8 +1,8 @@
 //! Which candidates are worth fitting: a score test of each at the present hypothesis, all that is uncertain projected out.
 
-use super::quadratic::{bounded_minimum, eliminate};
 use super::sweep::{Column, Swept};
 use crate::diagnose::library::Library;
+use inference::estimate::quadratic::{bounded_minimum, eliminate};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
