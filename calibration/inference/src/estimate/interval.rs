@@ -7,13 +7,21 @@
 
 use super::least_squares::Fit;
 use super::problem::Unknown;
+use super::quadratic::minimum;
 use crate::statistics;
 use nalgebra::{DMatrix, DVector};
+
+/// The rule of all intervals: half of that at `level` is the wider of two, by the curvature of the likelihood, right where residuals
+/// are independent and as large as their sigmas, and by how far witnesses scatter, with Student's t for their number. Both one sigma.
+pub fn half_width(level: f64, curvature: f64, scatter: f64, witnesses: usize) -> f64 {
+    let by_witnesses = statistics::student(level, witnesses.saturating_sub(1)) * scatter;
+    (statistics::normal(level) * curvature).max(by_witnesses)
+}
 
 /// How sure a fit is about its shared numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Intervals {
-    /// Half the 95 % interval of each number; infinite where the clips say nothing about it.
+    /// Half the interval of each number; infinite where the clips say nothing about it.
     pub half_width: Vec<f64>,
     /// Correlation of the estimates, `P x P`; zero in rows of numbers that the clips say nothing about.
     pub correlation: DMatrix<f64>,
@@ -27,12 +35,12 @@ pub struct Intervals {
 
 /// Below this share of its own information a number is what the others make of it.
 const COLLINEAR: f64 = 1e-10;
-/// Level of all intervals of parameters [1].
+/// Level of the intervals of identified parameters [1].
 pub const LEVEL: f64 = 0.95;
 
 impl Intervals {
-    /// At the fit's numbers. Those in `held` were not free: they rest on a bound, or nothing depends on them.
-    pub fn new(fit: &Fit, held: &[bool]) -> Self {
+    /// At the fit's numbers, of a level. Those in `held` were not free: they rest on a bound, or nothing depends on them.
+    pub fn new(fit: &Fit, held: &[bool], level: f64) -> Self {
         let n = fit.shared.len();
         let information = fit.information();
         let free: Vec<usize> = (0..n).filter(|k| !held[*k] && information[(*k, *k)] > 0.0).collect();
@@ -45,17 +53,15 @@ impl Intervals {
         let known = |k: usize| inverse[(k, k)] > 0.0;
         let sigma = |m: &DMatrix<f64>| (0..n).map(|k| m[(k, k)].max(0.0).sqrt()).collect::<Vec<_>>();
         let (model_sigma, witness_sigma) = (sigma(&inverse), sigma(&sandwich));
-        let (z, t) = (statistics::normal(LEVEL), statistics::student(LEVEL, witnesses.saturating_sub(1)));
-        let half_width = (0..n)
-            .map(|k| if known(k) { (z * model_sigma[k]).max(t * witness_sigma[k]) } else { f64::INFINITY })
-            .collect();
+        let half = |k: usize| half_width(level, model_sigma[k], witness_sigma[k], witnesses);
+        let half_width = (0..n).map(|k| if known(k) { half(k) } else { f64::INFINITY }).collect();
         let correlation = DMatrix::from_fn(n, n, |i, j| {
             if known(i) && known(j) { inverse[(i, j)] / (model_sigma[i] * model_sigma[j]) } else { 0.0 }
         });
         Self { half_width, correlation, model_sigma, witness_sigma, witnesses }
     }
 
-    /// Half the 95 % intervals if clips that add `more` information were recorded besides.
+    /// Half the intervals if clips that add `more` information were recorded besides.
     pub fn with_more(&self, fit: &Fit, more: &DMatrix<f64>) -> Vec<f64> {
         let n = self.half_width.len();
         let free: Vec<usize> = (0..n).filter(|k| self.half_width[*k].is_finite()).collect();
@@ -69,6 +75,39 @@ impl Intervals {
                 }
             })
             .collect()
+    }
+}
+
+/// How far a fit's parameters scatter, by the quadratic forms of its clips over (1, parameters): witnesses are whole clips, and their
+/// scatter is how the parameters move when each is left out (jackknife, Tukey 1958).
+pub struct Jackknife {
+    /// By the curvature, `P x P`; zero in rows of parameters that the clips say nothing about.
+    covariance: DMatrix<f64>,
+    /// How the parameters move without each clip.
+    shifts: Vec<Vec<f64>>,
+}
+
+impl Jackknife {
+    /// Of clips whose forms add up to `total`, what is known besides added.
+    pub fn new<'a>(total: &DMatrix<f64>, clips: impl Iterator<Item = &'a DMatrix<f64>>) -> Self {
+        let n = total.ncols() - 1;
+        let information = total.view((1, 1), (n, n)).into_owned();
+        let free: Vec<usize> = (0..n).filter(|k| information[(*k, *k)] > 0.0).collect();
+        let all: Vec<usize> = (1..=n).collect();
+        let covariance = spread(&inverse(&information, &free), &free, n);
+        Self { covariance, shifts: clips.map(|clip| minimum(&(total - clip), &all).at).collect() }
+    }
+
+    /// Half the interval, at `level`, of a sum of parameters, each times a factor.
+    pub fn half_width(&self, sum: &[(usize, f64)], level: f64) -> f64 {
+        let square = |(i, a): &(usize, f64)| sum.iter().map(|(j, b)| a * b * self.covariance[(*i, *j)]).sum::<f64>();
+        let curvature = sum.iter().map(square).sum::<f64>().max(0.0).sqrt();
+        let clips = self.shifts.len() as f64;
+        let moved = |shift: &Vec<f64>| sum.iter().map(|(k, factor)| factor * shift[*k]).sum::<f64>();
+        let moved: Vec<f64> = self.shifts.iter().map(moved).collect();
+        let mean = moved.iter().sum::<f64>() / clips;
+        let squares: f64 = moved.iter().map(|moved| (moved - mean).powi(2)).sum();
+        half_width(level, curvature, (squares * (clips - 1.0) / clips).sqrt(), moved.len())
     }
 }
 
@@ -173,7 +212,7 @@ mod tests {
         let inside = |seed| {
             let fit = fit(&Line::new(seed, lasting), &unknowns, &[], &Schedule::default(), |_, _| true);
             let fit = fit.expect("an answer");
-            let intervals = Intervals::new(&fit, &[false; 2]);
+            let intervals = Intervals::new(&fit, &[false; 2], LEVEL);
             (0..2).filter(|k| fit.shared[*k].abs() < intervals.half_width[*k]).count() as f64
         };
         (0..200).map(inside).sum::<f64>() / 400.0

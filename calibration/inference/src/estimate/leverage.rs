@@ -30,6 +30,7 @@ pub fn without_leaning(fit: &mut Fit, held: &[bool]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::interval::LEVEL;
     use super::super::{ClipModel, Impossible, Intervals, Schedule, Unknown, fit};
     use super::*;
 
@@ -55,9 +56,9 @@ mod tests {
         let mut found =
             fit(&Means([1.0, -2.0, 1.5, 6.0]), &[unknown], &[], &Schedule::default(), |_, _| true).expect("one");
         assert!((found.shared[0] - 6.0).abs() < 1e-3);
-        let before = Intervals::new(&found, &[false]).half_width[0];
+        let before = Intervals::new(&found, &[false], LEVEL).half_width[0];
         without_leaning(&mut found, &[false]);
-        let after = Intervals::new(&found, &[false]).half_width[0];
+        let after = Intervals::new(&found, &[false], LEVEL).half_width[0];
         // The other three say 0.2; the interval has to reach there.
         assert!(before < 0.01 && after > 5.8, "{before} {after}");
     }

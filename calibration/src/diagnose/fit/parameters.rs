@@ -1,7 +1,6 @@
 //! The numbers of an effect as a person reads them: in the effect's own units, each with a 90 % interval.
 //!
-//! An interval is the wider of two: from the curvature of the weighted deviance, and from how the number moves when clips are
-//! left out one by one (jackknife), with Student's t for as few clips as there are. Where a hit lies between a number and
+//! An interval is that of [`Jackknife`]. Where a hit lies between a number and
 //! what is seen, the step over which its slope was taken comes on top: the answer to less than that is rough. Of what was
 //! found on an arm alone the interval reaches to where the number would be without the twin's time step. Of a size on
 //! which nothing depends ([`super::undetermined`]), and of what was held and never fitted, all that is met in practice is
@@ -12,14 +11,13 @@ use super::bench::{Bench, Hypothesis};
 use crate::page::{Size, UNBOUNDED};
 use inference::likelihood::Evidence;
 use inference::likelihood::setting::Setting;
-use inference::estimate::quadratic::minimum;
-use inference::statistics::student_sigmas;
-use nalgebra::DMatrix;
+use inference::estimate::interval::Jackknife;
+use inference::statistics::normal;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};
 
-/// Half the width of a 90 % interval of a normal number, in sigmas.
-const NINETY: f64 = 1.645;
+/// Level of the intervals [1].
+const LEVEL: f64 = 0.90;
 
 /// The parameters of one of a hypothesis' effects.
 pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {
@@ -50,7 +48,8 @@ pub fn of_effect_moved<E: Evidence>(
             let place = hypothesis.free.iter().position(|free| *free == k);
             let half = place.map_or(0.0, |place| half_widths[place]);
             let moved = place.and_then(|place| time_step.get(place)).copied().unwrap_or(0.0);
-            let half = if rough && half > 0.0 { half.hypot(NINETY * bench.library.unknowns[k].step) } else { half };
+            let half =
+                if rough && half > 0.0 { half.hypot(normal(LEVEL) * bench.library.unknowns[k].step) } else { half };
             let unknown = candidate.sizes.contains(&k) || candidate.held.contains(&k);
             let open = unknown && !hypothesis.free.contains(&k);
             let interval = match bench.library.plausible(k).unwrap_or(parameter.plausible) {
@@ -80,23 +79,9 @@ fn readable(value: f64, [low, high]: [f64; 2], inverse: bool, possible: [f64; 2]
     (value, [low.max(possible[0]), high.min(possible[1])])
 }
 
-/// Half the 90 % interval of every free number.
+/// Half the interval of every free number.
 fn half_widths<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<f64> {
-    let total = bench.held(hypothesis);
-    let count = hypothesis.free.len();
-    let inner: DMatrix<f64> = total.view((1, 1), (count, count)).into_owned();
-    let curvature: Vec<f64> = inner
-        .cholesky()
-        .map_or_else(|| vec![0.0; count], |c| c.inverse().diagonal().iter().map(|v| v.sqrt()).collect());
-    let all: Vec<usize> = (1..=count).collect();
-    let shifts: Vec<Vec<f64>> =
-        hypothesis.fitted.iter().map(|clip| minimum(&(&total - &clip.reduced.form), &all).at).collect();
-    let clips = shifts.len() as f64;
-    let jackknife = |k: usize| {
-        let mean = shifts.iter().map(|shift| shift[k]).sum::<f64>() / clips;
-        let squares: f64 = shifts.iter().map(|shift| (shift[k] - mean).powi(2)).sum();
-        (squares * (clips - 1.0) / clips).sqrt()
-    };
-    let t = student_sigmas(NINETY, hypothesis.fitted.len().saturating_sub(1));
-    (0..count).map(|k| (NINETY * curvature[k]).max(t * jackknife(k))).collect()
+    let clips = hypothesis.fitted.iter().map(|clip| &clip.reduced.form);
+    let jackknife = Jackknife::new(&bench.held(hypothesis), clips);
+    (0..hypothesis.free.len()).map(|k| jackknife.half_width(&[(k, 1.0)], LEVEL)).collect()
 }

@@ -2,6 +2,7 @@
 
 use crate::identify::answer::{Identification, Parameter};
 use crate::identify::run::Outcome;
+use inference::estimate::interval::LEVEL;
 use inference::estimate::{Intervals, Unknown, at_bounds};
 use inference::likelihood::Settings;
 use std::collections::BTreeMap;
@@ -20,7 +21,7 @@ impl<'a> Finding<'a> {
     /// `open`: half widths of what the fit itself does not know to be open.
     pub(super) fn new(settings: &'a Settings, unknowns: &'a [Unknown], outcome: &'a Outcome, open: &[f64]) -> Self {
         let held = at_bounds(unknowns, &outcome.fit.shared);
-        let mut intervals = Intervals::new(&outcome.fit, &held);
+        let mut intervals = Intervals::new(&outcome.fit, &held, LEVEL);
         intervals.half_width.iter_mut().zip(open).for_each(|(half, open)| *half = half.hypot(*open));
         Self { settings, unknowns, held, outcome, intervals }
     }

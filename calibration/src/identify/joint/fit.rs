@@ -28,7 +28,7 @@ impl Found {
         let unknowns = model.unknowns();
         let fit = best_fit(motions)?;
         // Neither is negative, and one that is found to be 0 is as uncertain as any other.
-        let intervals = Intervals::new(&fit, &[false; 2]);
+        let intervals = Intervals::new(&fit, &[false; 2], LEVEL);
         let wider = (fit.misfit() * noise.lasts()).sqrt();
         let t = student(LEVEL, intervals.witnesses.saturating_sub(1));
         let rows: f64 = motions.iter().map(|motion| noise.independent(motion.times.len())).sum();

@@ -4,24 +4,11 @@
 //! elsewhere than simulated finds its own way first. A clip that nothing fits counts less, so that it does not steer
 //! the others.
 
-use inference::estimate::ClipFit;
-use inference::estimate::Fit;
-use inference::estimate::Impossible;
-use inference::estimate::Intervals;
-use inference::estimate::Random;
-use inference::estimate::Unknown;
-use inference::estimate::at_bounds;
-use inference::estimate::without_leaning;
+use inference::estimate::{ClipFit, Fit, Impossible, Intervals, Random, Unknown, at_bounds, without_leaning};
 use inference::likelihood::object::ObjectClips;
-use inference::estimate::profile::Profile;
-use inference::estimate::profile::profiled;
-use inference::estimate::solve::Descent;
-use inference::estimate::solve::End;
-use inference::estimate::solve::Problem;
-use inference::estimate::solve::Quadratic;
-use inference::estimate::solve::Schedule;
-use inference::estimate::solve::Trial;
-use inference::estimate::solve::descend;
+use inference::estimate::profile::{Profile, profiled};
+use inference::estimate::solve::{Descent, End, Problem, Quadratic, Schedule, Trial, descend};
+use inference::estimate::interval::LEVEL;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -91,7 +78,7 @@ impl Linearised {
         let mut fit = Fit { shared, clips, converged: self.small, evaluations: self.evaluations, history: Vec::new() };
         let held = at_bounds(unknowns, &fit.shared);
         without_leaning(&mut fit, &held);
-        let intervals = Intervals::new(&fit, &held);
+        let intervals = Intervals::new(&fit, &held, LEVEL);
         (fit, held, intervals)
     }
 
