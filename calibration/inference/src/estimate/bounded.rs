@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Ridge over the scaled information that rounding cannot undo.
-const RIDGE: f64 = 1e-12;
+const MIN_RIDGE: f64 = 1e-12;
 
 /// A damped Newton step `s` on `2 g's + s'Hs`, `H + damping diag H` in the place of `H`, that keeps each number in its `room` (how
 /// far down, at most 0, and how far up): numbers whose step would leave it go to their bound, all at once, and what they give up
@@ -44,7 +44,7 @@ fn solve(h: &DMatrix<f64>, g: &DVector<f64>, free: &[usize], damping: f64) -> DV
     });
     let right = DVector::from_fn(n, |i, _| g[free[used[i]]] / scale[used[i]]);
     let mut step = DVector::zeros(g.len());
-    let mut ridge = damping + RIDGE;
+    let mut ridge = damping + MIN_RIDGE;
     // Rounding may leave the scaled information a little indefinite: then a larger ridge is what it allows.
     while ridge < 1e3 {
         if let Some(factor) = (&scaled + DMatrix::identity(n, n) * ridge).cholesky() {

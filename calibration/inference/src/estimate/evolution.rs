@@ -4,7 +4,7 @@ use super::search::Search;
 use fcmaes_core::{Cmaes, CmaesParams, Fitness};
 
 /// First width of the cloud of points, in units of the bounds.
-const FIRST_WIDTH: f64 = 0.2;
+const INITIAL_WIDTH: f64 = 0.2;
 
 /// An evolution strategy that learns the shape of the valley.
 pub struct Evolution(Cmaes);
@@ -12,7 +12,7 @@ pub struct Evolution(Cmaes);
 impl Evolution {
     /// Around `start`, coordinates in units of the bounds.
     pub fn new(start: &[f64], seed: u64) -> Self {
-        Self::of_width(start, FIRST_WIDTH, seed)
+        Self::of_width(start, INITIAL_WIDTH, seed)
     }
 
     /// The same, the cloud at first of this width, in units of the bounds.

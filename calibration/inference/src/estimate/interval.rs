@@ -34,7 +34,7 @@ pub struct Intervals {
 }
 
 /// Below this share of its own information a number is what the others make of it.
-const COLLINEAR: f64 = 1e-10;
+const MIN_EIGENVALUE: f64 = 1e-10;
 /// Level of the intervals of identified parameters [1].
 pub const LEVEL: f64 = 0.95;
 
@@ -143,13 +143,13 @@ fn inverse(information: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
     }
     let eigen = scaled.symmetric_eigen();
     let lost: Vec<bool> = (0..n)
-        .map(|i| (0..n).any(|e| eigen.eigenvalues[e] < COLLINEAR && eigen.eigenvectors[(i, e)].abs() > 0.1))
+        .map(|i| (0..n).any(|e| eigen.eigenvalues[e] < MIN_EIGENVALUE && eigen.eigenvectors[(i, e)].abs() > 0.1))
         .collect();
     DMatrix::from_fn(n, n, |i, j| {
         if lost[i] || lost[j] {
             return 0.0;
         }
-        let parts = (0..n).filter(|e| eigen.eigenvalues[*e] >= COLLINEAR);
+        let parts = (0..n).filter(|e| eigen.eigenvalues[*e] >= MIN_EIGENVALUE);
         let sum: f64 =
             parts.map(|e| eigen.eigenvectors[(i, e)] * eigen.eigenvectors[(j, e)] / eigen.eigenvalues[e]).sum();
         sum / (scale[i] * scale[j])

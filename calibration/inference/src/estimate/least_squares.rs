@@ -146,7 +146,7 @@ pub fn go_on(
 }
 
 /// So many trials shorten the way of the shared parameters alone; then that of the nuisance parameters too.
-const SHARED_TRIALS: usize = 3;
+const TRIALS_OF_SHARED_ALONE: usize = 3;
 
 struct AllClips<'a, M, W> {
     model: Counted<'a, M>,
@@ -207,7 +207,7 @@ impl<M: ClipModel, W: Fn(&Underway<&Fit>) -> bool> Problem for AllClips<'_, M, W
     }
 
     fn stepped(&mut self, from: &Place, at: &Fit, Trial { number, step }: Trial<'_>) -> Option<(Place, f64)> {
-        let held = if self.unknowns.is_empty() { 0 } else { SHARED_TRIALS };
+        let held = if self.unknowns.is_empty() { 0 } else { TRIALS_OF_SHARED_ALONE };
         let share = 0.5_f64.powi(i32::try_from(number.saturating_sub(held)).unwrap_or(i32::MAX));
         let own = at.clips.iter().map(|clip| clip.own_part_way(step, share)).collect();
         let shared = (from.shared.iter().zip(self.unknowns).zip(step.iter()))

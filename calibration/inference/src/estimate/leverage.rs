@@ -6,7 +6,7 @@ use super::least_squares::Fit;
 use nalgebra::{DMatrix, DVector};
 
 /// Directions that a clip tells alone keep this share of its own information.
-const ALONE: f64 = 1e-9;
+const MIN_SHARE_OF_OTHERS: f64 = 1e-9;
 
 /// Makes each score of a fit's clips that of a fit without the clip. Numbers in `held` were not free.
 pub fn without_leaning(fit: &mut Fit, held: &[bool]) {
@@ -18,7 +18,7 @@ pub fn without_leaning(fit: &mut Fit, held: &[bool]) {
     let all = part(&information);
     for clip in &mut fit.clips {
         let own = part(&clip.information);
-        let others = &all - &own * (1.0 - ALONE);
+        let others = &all - &own * (1.0 - MIN_SHARE_OF_OTHERS);
         let Some(factor) = others.cholesky() else { continue };
         for score in &mut clip.scores {
             let scaled = DVector::from_fn(n, |i, _| score[free[i]] / scale[i]);

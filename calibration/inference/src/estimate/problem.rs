@@ -1,7 +1,7 @@
 //! What is asked of a set of clips, in numbers.
 
 /// A positive number whose bounds are so many times apart is known by its order of magnitude alone.
-const WIDE: f64 = 100.0;
+const RATIO_OF_UNKNOWN_MAGNITUDE: f64 = 100.0;
 
 /// A number that all clips share and that is to be found.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +28,7 @@ impl Unknown {
     /// published, is at most halved or doubled, since slopes say nothing about another order of magnitude.
     pub fn reach(&self, from: f64) -> [f64; 2] {
         let [down, up] = self.room(from);
-        if self.lower <= 0.0 || self.upper < WIDE * self.lower || down > 0.0 || up < 0.0 {
+        if self.lower <= 0.0 || self.upper < RATIO_OF_UNKNOWN_MAGNITUDE * self.lower || down > 0.0 || up < 0.0 {
             return [down, up];
         }
         [down.max(-0.5 * from), up.min(from)]

@@ -61,7 +61,7 @@ pub fn value(form: &DMatrix<f64>, free: &[usize], at: &[f64]) -> f64 {
 }
 
 /// Relative ridge: columns that say the same to this many digits are one.
-const RIDGE: f64 = 1e-9;
+const RELATIVE_RIDGE: f64 = 1e-9;
 
 fn factor(form: &DMatrix<f64>, free: &[usize]) -> Option<Cholesky<f64, Dyn>> {
     if free.is_empty() {
@@ -69,7 +69,7 @@ fn factor(form: &DMatrix<f64>, free: &[usize]) -> Option<Cholesky<f64, Dyn>> {
     }
     let mut inner = DMatrix::from_fn(free.len(), free.len(), |i, j| form[(free[i], free[j])]);
     for i in 0..free.len() {
-        inner[(i, i)] += RIDGE * inner[(i, i)] + f64::MIN_POSITIVE.sqrt();
+        inner[(i, i)] += RELATIVE_RIDGE * inner[(i, i)] + f64::MIN_POSITIVE.sqrt();
     }
     Cholesky::new(inner)
 }

@@ -15,7 +15,7 @@ pub struct Witness {
 }
 
 /// Of directions that one witness tells alone, others hold at least this share: nothing contradicts it there.
-const ALONE: f64 = 0.02;
+const MIN_SHARE_OF_OTHERS: f64 = 0.02;
 
 /// Covariance of the answer; `None` where the information leaves a direction open or is not finite.
 pub fn covariance<'a>(
@@ -34,7 +34,7 @@ pub fn covariance<'a>(
             return None;
         }
         let eigen = share.symmetric_eigen();
-        let by = eigen.eigenvalues.map(|share| (1.0 - share).max(ALONE).sqrt().recip());
+        let by = eigen.eigenvalues.map(|share| (1.0 - share).max(MIN_SHARE_OF_OTHERS).sqrt().recip());
         let wanted = root.solve_lower_triangular(score)?;
         let wanted = &eigen.eigenvectors * by.component_mul(&eigen.eigenvectors.tr_mul(&wanted));
         outer += &wanted * wanted.transpose();

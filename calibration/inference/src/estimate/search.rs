@@ -65,10 +65,10 @@ pub fn minimise(
 }
 
 /// What an impossible point costs: searches add and compare costs, so it is large, not infinite.
-const IMPOSSIBLE: f64 = 1e30;
+const COST_WITHOUT_ANSWER: f64 = 1e30;
 
 fn finite(cost: f64) -> f64 {
-    if cost.is_finite() { cost } else { IMPOSSIBLE }
+    if cost.is_finite() { cost } else { COST_WITHOUT_ANSWER }
 }
 
 fn numbers(unknowns: &[Unknown], point: &[f64]) -> Vec<f64> {

@@ -10,9 +10,9 @@ const PARTICLES: usize = 40;
 const INERTIA: f64 = 0.729_84;
 const ATTRACTION: f64 = 1.496_18;
 /// The swarm has arrived when it is no wider than this share of the bounds.
-const ARRIVED: f64 = 1e-7;
+const MAX_FINAL_WIDTH: f64 = 1e-7;
 /// Fastest a particle goes, in widths of the bounds per round.
-const FASTEST: f64 = 0.5;
+const MAX_SPEED: f64 = 0.5;
 
 #[derive(Debug, Clone)]
 struct Particle {
@@ -66,14 +66,15 @@ impl Search for Swarm {
                 let [own, common]: [f64; 2] = [self.random.random(), self.random.random()];
                 let place = particle.place[k];
                 let drawn = own * (particle.best[k] - place) + common * (self.best[k] - place);
-                let velocity = (INERTIA * particle.velocity[k] + ATTRACTION * drawn).clamp(-FASTEST, FASTEST);
+                let velocity = (INERTIA * particle.velocity[k] + ATTRACTION * drawn).clamp(-MAX_SPEED, MAX_SPEED);
                 (particle.place[k], particle.velocity[k]) = reflected(place + velocity, velocity);
             }
         }
     }
 
     fn arrived(&self) -> bool {
-        let far = |particle: &Particle| particle.place.iter().zip(&self.best).any(|(a, b)| (a - b).abs() > ARRIVED);
+        let far =
+            |particle: &Particle| particle.place.iter().zip(&self.best).any(|(a, b)| (a - b).abs() > MAX_FINAL_WIDTH);
         !self.particles.iter().any(far)
     }
 }

@@ -98,11 +98,11 @@ struct Approached {
 /// An effect weaker than this share of the strongest that is met in practice is none: two engines with other steps and other
 /// rules of integration differ by as much (0.35 % of a rotor's inertia and 0.02 % of viscous friction, measured on sessions
 /// of another engine with nothing wrong).
-const NEGLIGIBLE: f64 = 0.008;
+const NEGLIGIBLE_SHARE: f64 = 0.008;
 /// A control period and a half [s].
-const CONVENTION: f64 = 1.5e-3;
+const DELAY_OF_CONVENTION: f64 = 1.5e-3;
 /// Steps in which a clip finds its own numbers.
-const OWN_STEPS: usize = 2;
+const PROFILE_STEPS: usize = 2;
 
 /// Share of the strongest from which on an effect counts. What fades out towards infinity, as a gear's stiffness, is met
 /// in practice from the far end of its plausible range on; beyond, it is the ordinary stiffness of anything.
@@ -112,7 +112,7 @@ fn least(effect: &EffectInfo) -> f64 {
         Some(parameter) if matches!(parameter.role, Role::Size { .. }) => {
             parameter.plausible[0] / parameter.plausible[1]
         }
-        _ => NEGLIGIBLE,
+        _ => NEGLIGIBLE_SHARE,
     }
 }
 
@@ -356,7 +356,7 @@ impl<E: Likelihood> Bench<'_, E> {
 
     /// Clips with their own numbers at their best for shared ones that are given.
     pub(super) fn own_fitted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Option<Clips> {
-        let steps = if self.scatter.count() == 0 { 0 } else { OWN_STEPS };
+        let steps = if self.scatter.count() == 0 { 0 } else { PROFILE_STEPS };
         for _ in 0..steps {
             let swept = self.linearise(full, &[], &clips, Precision::Exact)?;
             let nothing = DVector::zeros(0);
@@ -381,7 +381,7 @@ impl<E: Likelihood> Bench<'_, E> {
     /// period: from which period on a filtered command acts is every engine's own.
     pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis<E::Own>) -> bool {
         let of_commands = |k: &usize| self.library.candidates[*k].effect.acts_on == Place::CommandPath;
-        let weak = |size: &usize| hypothesis.full[*size] - self.library.unknowns[*size].start < CONVENTION;
+        let weak = |size: &usize| hypothesis.full[*size] - self.library.unknowns[*size].start < DELAY_OF_CONVENTION;
         of_commands(&effect)
             && hypothesis.effects.iter().any(|other| *other != effect && of_commands(other))
             && self.library.candidates[effect].sizes.iter().all(weak)

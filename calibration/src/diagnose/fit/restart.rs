@@ -12,12 +12,12 @@ use nalgebra::DVector;
 
 /// A clip stands out that costs so many times the typical distance from the median more than the median does, and at least
 /// so much more.
-const OUTSTANDING: f64 = 4.0;
-const LEAST: f64 = 100.0;
+const OUTLIER_DISTANCE: f64 = 4.0;
+const MIN_EXCESS_COST: f64 = 100.0;
 /// Where along each of its own numbers it is tried [sigma], and what share of that is then kept: the way back to the likeliest
 /// value may lead over the edge again.
-const TRIED: [f64; 4] = [-5.0, -2.5, 2.5, 5.0];
-const KEPT: [f64; 2] = [0.5, 1.0];
+const RESTART_SIGMAS: [f64; 4] = [-5.0, -2.5, 2.5, 5.0];
+const KEPT_SHARES: [f64; 2] = [0.5, 1.0];
 
 impl<E: Likelihood> Bench<'_, E> {
     /// Clips with their own numbers, those that stand out where they cost least; those without an answer as they were.
@@ -42,7 +42,7 @@ impl<E: Likelihood> Bench<'_, E> {
         let even = &self.scatter.heavy;
         let numbers = (0..self.scatter.count()).filter(|number| !even.contains(number));
         let begun = numbers.flat_map(|number| {
-            TRIED.map(|sigmas| {
+            RESTART_SIGMAS.map(|sigmas| {
                 let mut own = vec![0.0; self.scatter.count()];
                 own[number] = sigmas * self.scatter.random[number].sigma;
                 (clip, own)
@@ -54,7 +54,7 @@ impl<E: Likelihood> Bench<'_, E> {
         for (at, (_, begun)) in swept.clips.iter().zip(&begun) {
             let after = swept.own_after(at, self.evidence, weights, &DVector::zeros(0)).ok()?;
             tried.push((clip, after.clone()));
-            tried.extend(KEPT.map(|share| {
+            tried.extend(KEPT_SHARES.map(|share| {
                 let kept = |k: usize| if even.contains(&k) { after[k] } else { share * begun[k] };
                 (clip, (0..after.len()).map(kept).collect())
             }));
@@ -68,7 +68,7 @@ impl<E: Likelihood> Bench<'_, E> {
 fn outstanding(costs: &[f64]) -> Vec<usize> {
     let Some(middle) = median(costs.iter().copied()) else { return Vec::new() };
     let typical = median(costs.iter().map(|cost| (cost - middle).abs())).unwrap_or(0.0);
-    let most = middle + LEAST.max(OUTSTANDING * typical);
+    let most = middle + MIN_EXCESS_COST.max(OUTLIER_DISTANCE * typical);
     (0..costs.len()).filter(|place| costs[*place] > most).collect()
 }
 

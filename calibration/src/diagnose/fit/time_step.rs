@@ -11,7 +11,7 @@ use inference::likelihood::Evidence;
 use nalgebra::DVector;
 
 /// From the difference to half steps to the whole error of whole ones.
-const EXTRAPOLATED: f64 = 4.0 / 3.0;
+const RICHARDSON_FACTOR: f64 = 4.0 / 3.0;
 
 /// How far each free number of a hypothesis would move; `None` where clips cannot be integrated in other steps, as those with an
 /// object. `weights`: those that it was fitted with.
@@ -29,7 +29,7 @@ pub fn error<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights
         let weighed = rows
             .iter()
             .zip(halves.iter().zip(whole.iter()))
-            .map(|(row, (half, whole))| weights[row.channel].powi(2) * EXTRAPOLATED * (half - whole));
+            .map(|(row, (half, whole))| weights[row.channel].powi(2) * RICHARDSON_FACTOR * (half - whole));
         slope += clip.matrix.columns(1, count).tr_mul(&DVector::from_iterator(rows.len(), weighed));
     }
     let information = bench.held(hypothesis).view((1, 1), (count, count)).into_owned();

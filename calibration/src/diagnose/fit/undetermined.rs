@@ -8,8 +8,8 @@ use twin::effects::Search;
 
 /// What a number may change of the clips' squared residuals, as a share and at least, and still be one that nothing depends
 /// on.
-const SHARE: f64 = 1e-6;
-const LEAST: f64 = 1.0;
+const MAX_CHANGE_SHARE: f64 = 1e-6;
+const MIN_CHANGE: f64 = 1.0;
 
 /// The hypothesis with the sizes of its effects on the arm at rest that nothing depends on, and no longer free.
 pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hypothesis {
@@ -42,7 +42,7 @@ pub fn sizes<E: Likelihood>(bench: &Bench<'_, E>, hypothesis: &Hypothesis<E::Own
             full[*k] = value;
             full
         };
-        let alike = |value: f64| (cost(&at(value)) - now).abs() < LEAST.max(SHARE * now);
+        let alike = |value: f64| (cost(&at(value)) - now).abs() < MIN_CHANGE.max(MAX_CHANGE_SHARE * now);
         // A number that was found to be at rest is known: what it does elsewhere tells. A limit that is never reached is none,
         // wherever it is.
         let never_reached = candidate.is_searched(Search::Limit);

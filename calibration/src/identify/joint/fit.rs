@@ -8,7 +8,7 @@ use inference::statistics::student;
 
 /// A number is not identifiable if its interval, to either side, is more than this share of what slows the part in all: the other may
 /// as well be what does.
-const SHARE: f64 = 0.5;
+const MAX_INTERVAL_SHARE: f64 = 0.5;
 
 /// Friction and damping of a joint.
 pub(super) struct Found {
@@ -59,7 +59,7 @@ impl Found {
     /// Whether the motions tell what slows the part in all, if not by which of the two.
     pub(super) fn tells_sum(&self) -> bool {
         let [slows, half] = self.slows();
-        half <= SHARE * slows
+        half <= MAX_INTERVAL_SHARE * slows
     }
 
     /// Why a number is not identifiable.
@@ -69,7 +69,7 @@ impl Found {
         }
         let [slows, _] = self.slows();
         let half = self.half[k] * if k == 0 { 1.0 } else { self.speed };
-        if half <= SHARE * slows {
+        if half <= MAX_INTERVAL_SHARE * slows {
             return None;
         }
         Some(if self.tells_sum() {

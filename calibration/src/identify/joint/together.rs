@@ -2,31 +2,31 @@
 //! the others do not explain.
 
 use super::agreement::disagreement;
-use super::alone::{Alone, KEPT};
+use super::alone::{Alone, MIN_KEPT_TRAVEL};
 use super::fit::held_out;
 use super::model::{Motion, best_fit};
 use super::noise::Noise;
 use inference::estimate::Fit;
 
 /// Cuts of a motion's beginning, each by the same number of rows.
-const CUTS: usize = 24;
+const CUTS_PER_MOTION: usize = 24;
 /// A motion from which the others lead farther away than this share of its travel is none of the same joint by itself.
-const ODD: f64 = 0.1;
+const MAX_DISAGREEMENT: f64 = 0.1;
 
 /// Cuts the beginnings of motions until one friction and one damping explain them all, worst first. A motion that half of its way does
 /// not bring to agree stays whole: its friction is another one.
 pub(super) fn cut_to_agree(motions: &mut [Alone], noise: &Noise) {
     let whole = motions.to_vec();
     let mut stays = vec![false; motions.len()];
-    for _ in 0..CUTS * motions.len() {
+    for _ in 0..CUTS_PER_MOTION * motions.len() {
         let all: Vec<Motion> = motions.iter().map(|alone| alone.motion.clone()).collect();
         let Some(fit) = best_fit(&all) else { return };
         let off = |k: &usize| of(&fit, *k, &motions[*k].motion, noise);
         let worst = (0..motions.len()).filter(|k| !stays[*k]).max_by(|a, b| off(a).total_cmp(&off(b)));
         let Some(worst) = worst.filter(|k| off(k) > 1.0) else { return };
-        let step = whole[worst].rows.len().div_ceil(CUTS);
+        let step = whole[worst].rows.len().div_ceil(CUTS_PER_MOTION);
         let shorter = motions[worst].without_first(step);
-        match shorter.filter(|shorter| shorter.motion.travel() >= KEPT * whole[worst].motion.travel()) {
+        match shorter.filter(|shorter| shorter.motion.travel() >= MIN_KEPT_TRAVEL * whole[worst].motion.travel()) {
             Some(shorter) => motions[worst] = shorter,
             None => (motions[worst], stays[worst]) = (whole[worst].clone(), true),
         }
@@ -41,7 +41,7 @@ pub(super) fn odd(motions: &[Motion]) -> Option<usize> {
     let off: Vec<f64> = (held_out(motions)?.iter().zip(motions))
         .map(|(fit, motion)| (fit.chi2 / fit.rows as f64).sqrt() * motion.sigma / motion.travel())
         .collect();
-    (0..off.len()).max_by(|a, b| off[*a].total_cmp(&off[*b])).filter(|worst| off[*worst] > ODD)
+    (0..off.len()).max_by(|a, b| off[*a].total_cmp(&off[*b])).filter(|worst| off[*worst] > MAX_DISAGREEMENT)
 }
 
 fn of(fit: &Fit, k: usize, motion: &Motion, noise: &Noise) -> f64 {

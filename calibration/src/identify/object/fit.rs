@@ -30,25 +30,25 @@ pub(super) struct ObjectFit {
 }
 
 /// What the search trusts a simulated clip to at first: poses as far as their noise, so that the resting places lead.
-const FIRST_ERROR: ModelError = ModelError {
+const INITIAL_MODEL_ERROR: ModelError = ModelError {
     hit: PoseNoise { position: 0.02, rotation: 0.2 },
     rest: PoseNoise { position: 0.0, rotation: 0.0 },
     joints: Some(1e-4),
     flat: true,
 };
 /// Most steps of the first way, and of one that need not arrive.
-const FIRST_STEPS: usize = 12;
+const INITIAL_STEPS: usize = 12;
 const ROUGH_STEPS: usize = 4;
 /// Rounds after it, each with the error that the round before left.
-const ROUNDS: usize = 4;
+const ERROR_ROUNDS: usize = 4;
 /// Poses of a moving object, and rows of the arm, of which one is a witness: their errors last.
-const ROWS_ALIKE: f64 = 5.0;
+const CORRELATED_ROWS: f64 = 5.0;
 /// Smallest error of the simulated joints: some steps of an encoder [rad].
-const LEAST_JOINT_ERROR: f64 = 2e-5;
+const MIN_JOINT_ERROR: f64 = 2e-5;
 
 /// Clips that are usually simulated until the end: for a bar alone.
 pub(super) fn usual_evaluations(clips: &ObjectClips, unknowns: &[Unknown]) -> usize {
-    (2 * (FIRST_STEPS + ROUNDS) * (2 + unknowns.len()) + points(unknowns.len())) * clips.clips()
+    (2 * (INITIAL_STEPS + ERROR_ROUNDS) * (2 + unknowns.len()) + points(unknowns.len())) * clips.clips()
 }
 
 /// Fits from `start` on. `watch` sees numbers and evaluations after every step; `false` ends the fit there.
@@ -63,9 +63,9 @@ pub(super) fn fit_object(
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> Result<ObjectFit, Impossible> {
     let mut search = Search::new(trail, &watch);
-    let mut at = search.first(clips, unknowns, start, FIRST_STEPS)?;
+    let mut at = search.first(clips, unknowns, start, INITIAL_STEPS)?;
     let random = clips.random().random;
-    for _ in 0..ROUNDS {
+    for _ in 0..ERROR_ROUNDS {
         if search.stopped {
             break;
         }
@@ -106,7 +106,7 @@ pub(super) fn linearise_object(
     unknowns: &[Unknown],
     at: &[f64],
 ) -> Result<Linearised, Impossible> {
-    clips.set_model_error(FIRST_ERROR);
+    clips.set_model_error(INITIAL_MODEL_ERROR);
     let random = clips.random().random;
     let own = vec![vec![0.0; random.len()]; clips.clips()];
     let first = Question { clips, unknowns, random: &random }.here(at, &own)?;
@@ -157,7 +157,7 @@ impl<'a, W: Fn(&[f64], usize) -> bool> Search<'a, W> {
         start: &[f64],
         most: usize,
     ) -> Result<Linearised, Impossible> {
-        clips.set_model_error(FIRST_ERROR);
+        clips.set_model_error(INITIAL_MODEL_ERROR);
         let random = held(clips);
         let own = vec![vec![0.0; random.len()]; clips.clips()];
         self.steps(&Question { clips, unknowns, random: &random }, (start, &own), most)
@@ -215,6 +215,6 @@ fn model_error(clips: &ObjectClips, at: &Linearised) -> Result<ModelError, Impos
         PoseNoise { position: beyond(place, noise.position), rotation: beyond(turn, noise.rotation) }
     };
     let joints = rms(&|channel, _| matches!(channel, Channel::Joint(_)));
-    let joints = Some(joints.max(LEAST_JOINT_ERROR) * ROWS_ALIKE.sqrt());
-    Ok(ModelError { hit: pose(Part::Hit, ROWS_ALIKE.sqrt()), rest: pose(Part::After, 1.0), joints, flat: true })
+    let joints = Some(joints.max(MIN_JOINT_ERROR) * CORRELATED_ROWS.sqrt());
+    Ok(ModelError { hit: pose(Part::Hit, CORRELATED_ROWS.sqrt()), rest: pose(Part::After, 1.0), joints, flat: true })
 }

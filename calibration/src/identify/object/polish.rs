@@ -20,7 +20,7 @@ use shared_mem::cell::ClipKind;
 use twin::scene::ObjectShape;
 
 /// No number is taken for known better than this share of its range.
-const BLUR: f64 = 0.01;
+const MIN_SPREAD_SHARE: f64 = 0.01;
 
 /// What is searched: the numbers and what they mean, the object's shape, and the seed of the cloud.
 #[derive(Clone, Copy)]
@@ -111,9 +111,9 @@ fn spread(information: &DMatrix<f64>, free: &[usize], unknowns: &[Unknown]) -> D
     let on_diagonal = |i: usize, j: usize, value: f64| if i == j { value } else { 0.0 };
     let held = |i: usize, j: usize| information[(free[i], free[j])] + on_diagonal(i, j, range(i).powi(-2));
     let covariance = DMatrix::from_fn(n, n, held).try_inverse().unwrap_or_else(|| DMatrix::zeros(n, n));
-    let blurred = |i: usize, j: usize| covariance[(i, j)] + on_diagonal(i, j, (BLUR * range(i)).powi(2));
+    let blurred = |i: usize, j: usize| covariance[(i, j)] + on_diagonal(i, j, (MIN_SPREAD_SHARE * range(i)).powi(2));
     let root = DMatrix::from_fn(n, n, blurred).cholesky().map(|root| root.l());
-    root.unwrap_or_else(|| DMatrix::from_fn(n, n, |i, j| on_diagonal(i, j, BLUR * range(i))))
+    root.unwrap_or_else(|| DMatrix::from_fn(n, n, |i, j| on_diagonal(i, j, MIN_SPREAD_SHARE * range(i))))
 }
 
 #[cfg(test)]

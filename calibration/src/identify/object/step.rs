@@ -39,13 +39,13 @@ pub(super) struct Linearised {
 }
 
 /// How much wider an interval may get by a look at the deviance.
-const WIDEST: f64 = 6.0;
+const MAX_WIDENING: f64 = 6.0;
 /// How nuisance parameters come to their best.
-const OWN: Schedule = Schedule { damping: 1e-6, trials: 12, iterations: 2, tolerance: 0.3, secant: None };
+const PROFILE: Schedule = Schedule { damping: 1e-6, trials: 12, iterations: 2, tolerance: 0.3, secant: None };
 /// One step of the shared ones. Much damping: a hit is rough, and a whole step seldom leads down.
-const STEP: Schedule = Schedule { damping: 1e-3, trials: 5, iterations: 1, tolerance: 0.3, secant: None };
+const SHARED_STEP: Schedule = Schedule { damping: 1e-3, trials: 5, iterations: 1, tolerance: 0.3, secant: None };
 /// A clip counts less from so many times the usual misfit on.
-const MISFIT: f64 = 4.0;
+const OUTLIER_MISFIT: f64 = 4.0;
 
 impl Linearised {
     /// `-2 ln` of the likelihood of all clips.
@@ -96,8 +96,8 @@ impl Question<'_> {
     pub(super) fn improved(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
         let mut strokes = Strokes { question: *self, evaluations: 0 };
         let place = strokes.profiled(shared, own)?;
-        let mut way = Descent { place, slopes: None, damping: STEP.damping };
-        let end = descend(&mut strokes, &mut way, &STEP)?;
+        let mut way = Descent { place, slopes: None, damping: SHARED_STEP.damping };
+        let end = descend(&mut strokes, &mut way, &SHARED_STEP)?;
         let at = match way.slopes {
             Some(at) => at,
             None => strokes.linearised(&way.place)?,
@@ -116,7 +116,7 @@ impl Question<'_> {
         Ok(Linearised { evaluations: strokes.evaluations, ..at })
     }
 
-    /// By how much wider than slopes say the clips leave each number, 1 to [`WIDEST`]: the deviance is looked at where the
+    /// By how much wider than slopes say the clips leave each number, 1 to [`MAX_WIDENING`]: the deviance is looked at where the
     /// interval of half width `half` ends, to both sides, the other numbers following. A hit's roughness makes slopes, and
     /// so information, larger than what the clips can really tell, and nearer by nothing but the roughness would be seen.
     ///
@@ -144,7 +144,7 @@ impl Question<'_> {
                 }
             }
             // Both sides together: one alone may fall by chance where the hit is rough.
-            *width = (promised / risen.max(1e-9)).sqrt().clamp(1.0, WIDEST);
+            *width = (promised / risen.max(1e-9)).sqrt().clamp(1.0, MAX_WIDENING);
         }
         Ok((widths, strokes.evaluations))
     }
@@ -174,7 +174,7 @@ struct Strokes<'a> {
 impl Strokes<'_> {
     fn profiled(&mut self, shared: &[f64], own: &[Vec<f64>]) -> Result<Place, Impossible> {
         let Question { clips, random, .. } = self.question;
-        let clips = profiled(clips, shared, random, own, &OWN)?;
+        let clips = profiled(clips, shared, random, own, &PROFILE)?;
         self.evaluations += clips.iter().map(|profile| profile.evaluations).sum::<usize>();
         Ok(Place { shared: shared.to_vec(), clips })
     }
@@ -220,5 +220,5 @@ fn weights(clips: &[ClipFit]) -> Vec<f64> {
     let mut sorted = misfits.clone();
     sorted.sort_by(f64::total_cmp);
     let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(0.25);
-    misfits.into_iter().map(|misfit| (MISFIT * usual / misfit).min(1.0)).collect()
+    misfits.into_iter().map(|misfit| (OUTLIER_MISFIT * usual / misfit).min(1.0)).collect()
 }

@@ -17,23 +17,23 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Times that points are scattered.
-const ROUNDS: usize = 3;
+const SCATTER_ROUNDS: usize = 3;
 /// First width of the scatter, in what coordinates are counted in, and its shrinking from round to round.
-const WIDTH: f64 = 1.5;
-const NARROWER: f64 = 0.6;
+const INITIAL_WIDTH: f64 = 1.5;
+const WIDTH_SHRINK: f64 = 0.6;
 /// How far the modelled loss may lead away from the middle of the scatter, in its widths.
-const REACH: f64 = 2.0;
+const REACH_IN_WIDTHS: f64 = 2.0;
 /// Looks at the modelled loss in a round.
-const LOOKS: usize = 400;
+const MODEL_EVALUATIONS: usize = 400;
 /// Of the poses that count, every third is modelled.
-const EVERY: usize = 3;
+const POSE_STRIDE: usize = 3;
 /// What the regression holds slopes back with, in squared widths: enough for a direction that few points went to.
-const RIDGE: f64 = 0.3;
+const SLOPE_RIDGE: f64 = 0.3;
 
 /// Points whose loss is asked for at most, of so many coordinates: where all begins, and in every round those scattered
 /// and the place they lead to.
 pub(super) const fn points(coordinates: usize) -> usize {
-    1 + ROUNDS * (scattered(coordinates) + 1)
+    1 + SCATTER_ROUNDS * (scattered(coordinates) + 1)
 }
 
 /// Pairs in one more direction than there are.
@@ -62,10 +62,10 @@ pub(super) fn descend(
 ) -> (Vec<f64>, usize) {
     let mut random = Pcg64::seed_from_u64(seed);
     let ask = |at: &Vec<f64>| ask(loss, weights, at, &place(at)).ok();
-    let (mut middle, mut width, mut simulated) = (vec![0.0; coordinates], WIDTH, loss.clips());
+    let (mut middle, mut width, mut simulated) = (vec![0.0; coordinates], INITIAL_WIDTH, loss.clips());
     let mut asked: Vec<Asked> = ask(&middle).into_iter().collect();
     let mut middles: Vec<(f64, Vec<f64>)> = asked.iter().map(|first| (first.loss, first.at.clone())).collect();
-    for round in 0..ROUNDS {
+    for round in 0..SCATTER_ROUNDS {
         let scattered = scatter(&middle, width, &mut random);
         simulated += (scattered.len() + 1) * loss.clips();
         let of_round = Fingerprint::of(name).with(&("round", round));
@@ -76,7 +76,7 @@ pub(super) fn descend(
             middles.push((there.loss, middle.clone()));
             asked.push(there);
         }
-        width *= NARROWER;
+        width *= WIDTH_SHRINK;
         if !watch(&middle, simulated) {
             break;
         }
@@ -88,7 +88,7 @@ pub(super) fn descend(
 fn ask(loss: &SurfaceLoss<'_>, weights: &[f64], at: &[f64], numbers: &[f64]) -> Result<Asked, Impossible> {
     let slips = loss.slips(numbers)?;
     let mean = loss.mean_of(&slips, weights);
-    let some = |of_clip: &Vec<Slip>| of_clip.iter().step_by(EVERY).map(|slip| (*slip).into()).collect();
+    let some = |of_clip: &Vec<Slip>| of_clip.iter().step_by(POSE_STRIDE).map(|slip| (*slip).into()).collect();
     let slips = slips.iter().map(some).collect();
     Ok(Asked { at: at.to_vec(), slips, loss: mean })
 }
@@ -134,10 +134,10 @@ impl Vicinity {
         let y = DMatrix::from_fn(asked.len(), 6 * poses.iter().sum::<usize>(), |i, k| roots[i] * went[i][k]);
         let mut gram = x.tr_mul(&x);
         for k in 1..=n {
-            gram[(k, k)] += RIDGE * width * width;
+            gram[(k, k)] += SLOPE_RIDGE * width * width;
         }
         let slopes = Cholesky::new(gram)?.solve(&x.tr_mul(&y));
-        Some(Self { middle: middle.to_vec(), reach: REACH * width, poses, slopes })
+        Some(Self { middle: middle.to_vec(), reach: REACH_IN_WIDTHS * width, poses, slopes })
     }
 
     /// Where the modelled poses have the least loss.
@@ -152,7 +152,7 @@ impl Vicinity {
         let axes: Vec<Unknown> = self.middle.iter().map(axis).collect();
         let modelled = |at: &[f64]| loss.mean_of(&self.slips(at), weights);
         let mut cloud = Evolution::new(&search::start(&axes), seed);
-        minimise(&mut cloud, &axes, LOOKS, &[], modelled, |_, _| true).numbers
+        minimise(&mut cloud, &axes, MODEL_EVALUATIONS, &[], modelled, |_, _| true).numbers
     }
 
     /// Where the poses go, clip by clip.
@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn points_lie_on_both_sides_and_are_as_many_as_the_bar_counts() {
         let scattered = scatter(&[0.5, -1.0, 2.0], 0.7, &mut Pcg64::seed_from_u64(1));
-        assert_eq!(1 + ROUNDS * (scattered.len() + 1), points(3));
+        assert_eq!(1 + SCATTER_ROUNDS * (scattered.len() + 1), points(3));
         for k in 0..3 {
             let mean = scattered.iter().map(|at| at[k]).sum::<f64>() / scattered.len() as f64;
             assert!((mean - [0.5, -1.0, 2.0][k]).abs() < 1e-12);
