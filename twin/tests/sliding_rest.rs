@@ -124,6 +124,7 @@ fn a_pull_upwards_takes_the_body_off_the_table() {
 
 #[test]
 fn no_motion_gains_energy_whatever_the_table_is_made_of() {
+    #[derive(Clone, Copy, PartialEq)]
     struct Rough;
     impl SlidingFriction for Rough {
         fn mu(&self, point: Vector2<f64>, velocity: Vector2<f64>) -> f64 {

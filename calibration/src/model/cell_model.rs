@@ -285,7 +285,7 @@ impl Object {
         let of = |value: f64, found: bool| Known::new(value, if found { THETA } else { CELL });
         let law = effects.hit.real_law(ContactLaw::nominal(model.tip_friction));
         let centre = found.centre_of_mass.is_some();
-        let outline = Outline::of(&model, effects)?;
+        let outline = Outline::of(&model, &effects.material(model.parameters()))?;
         Ok(Some(Self {
             half_extents: match &model.shape {
                 ObjectShape::Box { half_extents } => Some(*half_extents),

@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | `arm` | commands, torques, joints, joint sensing, the arm's bodies | [`crate::rollout`], [`crate::sim`] |
 //! | `hit` | the contact of tool and object, the object's inertia | [`crate::sim`] |
-//! | `slide` | friction and pressure under the object, the table's lean | [`crate::physics`] |
+//! | `slide` | friction and pressure under the object, the table's lean | [`crate::sim`], for [`crate::physics`] |
 //! | `camera` | what the tracker reports | [`crate::sensors`], replay |
 //!
 //! The list with all parameters: `docs/effects.md`, which a test keeps to the registry. C1 to V10 in the signatures are the
@@ -43,6 +43,8 @@ pub use slide::{SlideEffects, TableFriction};
 pub use stated::stated;
 pub use values::EffectError;
 
+use crate::physics::Material;
+use crate::scene::ObjectParameters;
 use registry::named;
 use shared_mem::theta::EffectTheta;
 use values::Values;
@@ -78,6 +80,13 @@ impl Effects {
             }
         }
         Ok(effects)
+    }
+
+    /// An object and its table as they are, in the numbers of [`crate::physics`].
+    pub fn material(&self, parameters: ObjectParameters) -> Material<TableFriction> {
+        let nominal = Material::nominal(parameters);
+        let yaw_inertia_factor = self.hit.object_inertia.map_or(nominal.yaw_inertia_factor, |effect| effect.factor);
+        self.slide.material(Material { yaw_inertia_factor, ..nominal })
     }
 
     /// Whether there is none at all.

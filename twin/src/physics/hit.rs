@@ -160,10 +160,10 @@ fn restitution_of(ratio: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::Effects;
-    use crate::physics::TableObject;
     use crate::physics::touch::Capsule;
+    use crate::physics::{Material, TableObject};
     use crate::scene::{ObjectModel, ObjectShape};
+    use crate::sliding::Coulomb;
     use nalgebra::{Isometry3, Point3};
     use shared_mem::cell::Support;
 
@@ -182,8 +182,8 @@ mod tests {
         }
     }
 
-    fn floating_box() -> TableObject {
-        TableObject::new(&box_model(), None, &Effects::default()).expect("a box")
+    fn floating_box() -> TableObject<Coulomb> {
+        TableObject::new(&box_model(), Material::nominal(box_model().parameters()), None).expect("a box")
     }
 
     /// An upright tool of [`TOOL_MASS`] that only translates, `tip` being the end of its segment.
@@ -198,7 +198,13 @@ mod tests {
 
     /// Flies the tool against the box along x at `speed`; velocity of tool and box (its centre) afterwards, at `tip_height`
     /// over the box's centre. No table; gravity is taken out of the result.
-    fn collide(law: ContactLaw, speed: f64, tip_height: f64, offset: f64, dt: f64) -> (Vector3<f64>, TableObject, f64) {
+    fn collide(
+        law: ContactLaw,
+        speed: f64,
+        tip_height: f64,
+        offset: f64,
+        dt: f64,
+    ) -> (Vector3<f64>, TableObject<Coulomb>, f64) {
         let mut object = floating_box();
         let (mut tip, mut velocity) = (Point3::new(-0.054, offset, tip_height), Vector3::x() * speed);
         let (mut time, mut fallen) = (0.0, 0.0);
@@ -215,7 +221,7 @@ mod tests {
         (velocity, object, fallen)
     }
 
-    fn centre_velocity(object: &TableObject, fallen: f64) -> Vector3<f64> {
+    fn centre_velocity(object: &TableObject<Coulomb>, fallen: f64) -> Vector3<f64> {
         object.velocity_at(&Point3::from(object.isometry().translation.vector)) + Vector3::z() * fallen
     }
 
@@ -268,7 +274,8 @@ mod tests {
     fn a_table_behind_the_object_makes_the_same_touch_push_harder() {
         // High on the face: free, the box turns away; on the table its front edge holds against that.
         let peak = |table: Option<f64>| {
-            let mut object = TableObject::new(&box_model(), table, &Effects::default()).expect("a box");
+            let mut object =
+                TableObject::new(&box_model(), Material::nominal(box_model().parameters()), table).expect("a box");
             let touch = object.touch(&TOOL, &upright(Point3::new(-0.0519, 0.0, 0.045)));
             object.step(FINE, &[press(touch, Vector3::x() * 0.5, ContactLaw::nominal(0.0))])[0].x
         };

@@ -42,12 +42,13 @@ pub(super) struct Contact {
 
 /// The same with what it takes to find its impulse.
 #[derive(Clone, Copy)]
-struct Place {
-    contact: Contact,
+pub(super) struct Place {
+    pub(super) contact: Contact,
     /// Impulse for one unit of velocity: along the normal, and across it in the most mobile direction.
-    normal_mass: f64,
-    slip_mass: f64,
-    impulse: Vector3<f64>,
+    pub(super) normal_mass: f64,
+    pub(super) slip_mass: f64,
+    /// Found so far [N s].
+    pub(super) impulse: Vector3<f64>,
 }
 
 /// A body in the middle of a step, and at most `N` places that touch it.
@@ -74,17 +75,18 @@ impl Place {
     const NONE: Self =
         Self { contact: Contact::NONE, normal_mass: 1.0, slip_mass: 1.0, impulse: Vector3::new(0.0, 0.0, 0.0) };
 
-    /// The impulse with which the place gives way as it must and rubs as it can, from its velocity relative to the surface.
+    /// The projected impulse, from the place's velocity relative to the surface: complementary to the parting speed along the
+    /// normal, within Coulomb's cone across it.
     #[inline]
-    fn relaxed(&self, relative: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn projected(&self, relative: &Vector3<f64>) -> Vector3<f64> {
         let Contact { normal, least_parting, friction, .. } = &self.contact;
         let (parting, before) = (relative.dot(normal), self.impulse.dot(normal));
         let push = (before + (least_parting - parting) * self.normal_mass).max(0.0);
         let slip = relative - normal * parting;
         let wanted = self.impulse - normal * before - slip * self.slip_mass;
         let (limit, square) = (friction * push, wanted.norm_squared());
-        let rubbing = if square > limit * limit { wanted * (limit / square.sqrt()) } else { wanted };
-        normal * push + rubbing
+        let friction = if square > limit * limit { wanted * (limit / square.sqrt()) } else { wanted };
+        normal * push + friction
     }
 }
 
@@ -162,7 +164,7 @@ impl<'a, const N: usize> Impulses<'a, N> {
             let mut largest: f64 = 0.0;
             for i in 0..self.count {
                 let relative = self.relative(i);
-                let change = self.places[i].relaxed(&relative) - self.places[i].impulse;
+                let change = self.places[i].projected(&relative) - self.places[i].impulse;
                 self.push(i, &change);
                 largest = largest.max(change.amax() * self.inverse_mass);
             }

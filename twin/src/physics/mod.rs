@@ -9,6 +9,7 @@ mod convert;
 pub mod hit;
 mod hull;
 mod impulses;
+mod material;
 mod outline;
 mod pieces;
 mod push;
@@ -19,6 +20,7 @@ pub mod touch;
 mod tumble;
 
 pub use hull::{Face, Hull};
+pub use material::Material;
 pub use outline::Outline;
 pub use pieces::{Piece, convex_pieces};
 pub use shape::FlatMesh;

@@ -1,7 +1,7 @@
 //! What a model file for another simulator needs of the object: its hull, its inertia, and where its base presses.
 
+use super::material::Material;
 use super::shape::{CollisionShape, FlatMesh};
-use crate::effects::Effects;
 use crate::scene::ObjectModel;
 use crate::sliding::{BASE, Patch};
 use nalgebra::{Matrix3, Point3, Vector2};
@@ -20,18 +20,18 @@ pub struct Outline {
 }
 
 impl Outline {
-    /// Of an object in its nominal upright pose; of `effects` those on its body and its base count.
+    /// Of an object of the model's shape in its nominal upright pose.
     ///
     /// # Errors
     /// [`FlatMesh`] when a mesh encloses no volume or has no base to stand on.
-    pub fn of(model: &ObjectModel, effects: &Effects) -> Result<Self, FlatMesh> {
+    pub fn of<F>(model: &ObjectModel, made_of: &Material<F>) -> Result<Self, FlatMesh> {
         let CollisionShape { corners, unit_inertia, .. } = CollisionShape::new(&model.shape)?;
-        let mut inertia = unit_inertia * model.mass;
-        inertia[(2, 2)] *= effects.hit.yaw_inertia_factor();
+        let mut inertia = unit_inertia * made_of.parameters.mass;
+        inertia[(2, 2)] *= made_of.yaw_inertia_factor;
         let lowest = corners.iter().map(|corner| corner.z).fold(f64::INFINITY, f64::min);
         let base = corners.iter().filter(|corner| corner.z < lowest + BASE).map(|corner| corner.coords.xy());
         let patch = Patch::under(base, model.support).map_err(|_| FlatMesh)?;
-        let places = patch.reaching(effects.slide.pressure_reach()).places().collect();
+        let places = patch.reaching(made_of.pressure_reach).places().collect();
         Ok(Self { corners, inertia, places, depth: -lowest })
     }
 }
@@ -44,7 +44,7 @@ mod tests {
     #[test]
     fn the_shipped_box_stands_on_its_four_corners_with_a_homogeneous_inertia() {
         let model = ObjectModel::new(&shipped(), None).expect("a box").expect("an object");
-        let outline = Outline::of(&model, &Effects::default()).expect("a box has a volume");
+        let outline = Outline::of(&model, &Material::nominal(model.parameters())).expect("a box has a volume");
         assert_eq!((outline.corners.len(), outline.places.len(), outline.depth), (8, 4, 0.05));
         assert!(outline.places.iter().all(|(place, share)| {
             (place.x.abs() - 0.04).abs() < 1e-12 && (place.y.abs() - 0.03).abs() < 1e-12 && *share == 0.25

@@ -3,8 +3,10 @@
 //! all six freedoms. Base frame, SI. Called by [`super::TableObject`].
 
 use super::hit::Press;
+use super::impulses::Place;
+use super::material::Material;
 use super::tumble::Tumbling;
-use crate::sliding::{Footing, FreeBody, PlanarState, Wrench};
+use crate::sliding::{Footing, FreeBody, PlanarState, SlidingFriction, Wrench};
 use nalgebra::Vector3;
 
 /// Sweeps over the two places, and the change of impulse over mass [m/s] below which they end early.
@@ -22,20 +24,7 @@ struct Pushed<'a> {
     yaw_inertia: f64,
 }
 
-/// One place under the tool.
-struct Place {
-    lever: Vector3<f64>,
-    normal: Vector3<f64>,
-    surface_velocity: Vector3<f64>,
-    least_parting: f64,
-    friction: f64,
-    /// Impulse for one unit of velocity, along the normal and across it.
-    normal_mass: f64,
-    slip_mass: f64,
-    impulse: Vector3<f64>,
-}
-
-impl Tumbling {
+impl<F: SlidingFriction> Tumbling<F> {
     /// The presses' forces on a body that goes on standing [N]; `None` when such a one could not give way to them.
     pub(super) fn push(
         &self,
@@ -50,11 +39,12 @@ impl Tumbling {
         // In the short steps of a hit the table's friction is nothing against the push.
         let rates = if presses.iter().any(|press| press.steady) {
             let alone = self.wrench(footing, body, &[], &Default::default());
-            footing.slider.rates(state, &alone, &self.friction)
+            footing.slider.rates(state, &alone, &self.made_of.friction)
         } else {
             Vector3::zeros()
         };
-        Pushed { body, rates, mass: self.mass, yaw_inertia: footing.slider.yaw_inertia }.forces(presses, dt)
+        let mass = self.made_of.parameters.mass;
+        Pushed { body, rates, mass, yaw_inertia: footing.slider.yaw_inertia }.forces(presses, dt)
     }
 
     /// What acts on a standing body but for the table's answer.
@@ -65,17 +55,18 @@ impl Tumbling {
         presses: &[Press],
         forces: &[Vector3<f64>; 2],
     ) -> Wrench {
-        let weight = Wrench::weight(self.mass, self.gravity);
+        let Material { parameters, gravity, drag, .. } = &self.made_of;
+        let weight = Wrench::weight(parameters.mass, *gravity);
         let pushed = presses
             .iter()
             .zip(forces)
             .fold(weight, |sum, (press, force)| sum.with_force(*force, press.touch.point - body.centre));
-        let Some(height) = self.table_height.filter(|_| self.drag > 0.0) else { return pushed };
-        let middle = body.rotation * self.middle;
+        let Some(height) = self.table_height.filter(|_| *drag > 0.0) else { return pushed };
+        let middle = body.rotation * -parameters.centre_of_mass;
         let lever = Vector3::new(middle.x, middle.y, height - body.centre.z);
         let velocity = body.velocity + body.angular_velocity.cross(&lever);
-        let mut dragged = pushed.with_force(velocity * -self.drag, lever);
-        dragged.moment.z -= self.drag * footing.slider.patch.gyration_squared() * body.angular_velocity.z;
+        let mut dragged = pushed.with_force(velocity * -drag, lever);
+        dragged.moment.z -= drag * footing.slider.patch.gyration_squared() * body.angular_velocity.z;
         dragged
     }
 }
@@ -95,9 +86,12 @@ impl Pushed<'_> {
         for _ in 0..SWEEPS {
             let mut largest: f64 = 0.0;
             for place in places.iter_mut().flatten() {
-                let change = place.relax(&at(&place.lever, &velocity, spin));
+                let lever = place.contact.lever;
+                let projected = place.projected(&(at(&lever, &velocity, spin) - place.contact.surface_velocity));
+                let change = projected - place.impulse;
+                place.impulse = projected;
                 velocity += Vector3::new(change.x, change.y, 0.0) * per_mass;
-                spin += (place.lever.x * change.y - place.lever.y * change.x) * per_inertia;
+                spin += (lever.x * change.y - lever.y * change.x) * per_inertia;
                 largest = largest.max(change.amax() * per_mass);
             }
             if largest < SETTLED {
@@ -113,33 +107,11 @@ impl Pushed<'_> {
         let (along, turning) = (normal.xy().norm_squared(), lever.x * normal.y - lever.y * normal.x);
         let before = at(&lever, &self.body.velocity, self.body.angular_velocity.z);
         Place {
-            lever,
-            normal,
-            surface_velocity: press.surface_velocity(dt),
-            least_parting: press.least_parting(&before, dt),
-            friction: press.motion.friction,
+            contact: press.contact(lever, before, dt),
             normal_mass: 1.0 / (along / self.mass + turning * turning / self.yaw_inertia),
             slip_mass: 1.0 / (1.0 / self.mass + lever.xy().norm_squared() / self.yaw_inertia),
             impulse: Vector3::zeros(),
         }
-    }
-}
-
-impl Place {
-    /// Makes the place give way as it must and rub as it can; the change of its impulse [N s].
-    fn relax(&mut self, velocity: &Vector3<f64>) -> Vector3<f64> {
-        let relative = velocity - self.surface_velocity;
-        let parting = relative.dot(&self.normal);
-        let before = self.impulse.dot(&self.normal);
-        let normal = (before + (self.least_parting - parting) * self.normal_mass).max(0.0);
-        let slip = relative - self.normal * parting;
-        let wanted = self.impulse - self.normal * before - slip * self.slip_mass;
-        let (limit, square) = (self.friction * normal, wanted.norm_squared());
-        let rubbing = if square > limit * limit { wanted * (limit / square.sqrt()) } else { wanted };
-        let impulse = self.normal * normal + rubbing;
-        let change = impulse - self.impulse;
-        self.impulse = impulse;
-        change
     }
 }
 

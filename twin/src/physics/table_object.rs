@@ -9,36 +9,27 @@ mod tests;
 
 use super::hit::Press;
 use super::hull::Hull;
+use super::material::Material;
 use super::shape::{CollisionShape, FlatMesh};
 use super::tumble::Tumbling;
-use crate::effects::{Effects, SlideEffects, TableFriction};
-use crate::scene::{ObjectModel, ObjectParameters};
-use crate::sliding::{BASE, Closeness, Ending, Footing, FreeBody, PlanarState, Solid};
+use crate::scene::ObjectModel;
+use crate::sliding::{BASE, Closeness, Ending, Footing, FreeBody, PlanarState, SlidingFriction, Solid};
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
-use shared_mem::cell::{GRAVITY, Support};
+use shared_mem::cell::Support;
 use shared_mem::frames::{Base, Object, Pose};
 
-/// The object, its table and the time step between them.
+/// The object, its table and the time step between them; `F` is the law of friction between the two.
 #[derive(Clone)]
-pub struct TableObject {
+pub struct TableObject<F> {
     shape: CollisionShape,
     support: Support,
-    made_of: Material,
-    tumbling: Tumbling,
-    motion: ObjectMotion,
-}
-
-/// Everything about an object's physics that is not its shape.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Material {
-    parameters: ObjectParameters,
-    yaw_factor: f64,
-    slide: SlideEffects,
+    tumbling: Tumbling<F>,
+    motion: ObjectMotion<F>,
 }
 
 /// Everything about an object that changes over time.
 #[derive(Debug, Clone, Copy)]
-pub struct ObjectMotion {
+pub struct ObjectMotion<F> {
     body: FreeBody,
     /// How the body stands while it stands: its motion is this one's then.
     standing: Option<(Footing, PlanarState)>,
@@ -46,8 +37,9 @@ pub struct ObjectMotion {
     rests: bool,
     /// Where the table is from the face on which it stands or last stood, object axes.
     down: Vector3<f64>,
-    made_of: Material,
+    made_of: Material<F>,
 }
+
 /// Longest step of a free body [s]: steps of a twelfth move the resting place of a tossed box by less than 0.2 mm.
 const FREE_STEP: f64 = 1.25e-4;
 /// Longest step under a film's drag [s].
@@ -61,62 +53,48 @@ const LEANING_STEP: f64 = 3.4e-4;
 /// corners.
 const TOPPLES: f64 = 0.3;
 
-impl TableObject {
-    /// The object at the origin, at rest. Without `table_height` there is no table and it falls. Of `effects` those on
-    /// the object and its slide act.
+impl<F: SlidingFriction> TableObject<F> {
+    /// A body of the model's shape at the origin, at rest. Without `table_height` there is no table and it falls.
     ///
     /// # Errors
     /// [`FlatMesh`] when the object's mesh has no convex hull.
-    pub fn new(model: &ObjectModel, table_height: Option<f64>, effects: &Effects) -> Result<Self, FlatMesh> {
+    pub fn new(model: &ObjectModel, made_of: Material<F>, table_height: Option<f64>) -> Result<Self, FlatMesh> {
         let shape = CollisionShape::new(&model.shape)?;
-        let made_of = Material::new(model.parameters(), effects);
         let tumbling = Tumbling {
             corners: vec![Vector3::zeros(); shape.corners.len()],
-            mass: 1.0,
             inertia: Matrix3::identity(),
             inverse_inertia: Matrix3::identity(),
             table_height,
-            friction: TableFriction { nominal: 0.0, effects: None },
-            restitution: 0.0,
-            gravity: Vector3::zeros(),
-            drag: 0.0,
-            middle: Vector3::zeros(),
+            made_of,
         };
         let body = FreeBody {
-            centre: Point3::from(model.centre_of_mass),
+            centre: Point3::from(made_of.parameters.centre_of_mass),
             rotation: UnitQuaternion::identity(),
             velocity: Vector3::zeros(),
             angular_velocity: Vector3::zeros(),
         };
         let motion = ObjectMotion { body, standing: None, rests: false, down: -Vector3::z(), made_of };
-        let mut object = Self { shape, support: model.support, made_of, tumbling, motion };
+        let mut object = Self { shape, support: model.support, tumbling, motion };
         object.take(made_of);
         Ok(object)
     }
 
     /// The same shape made of something else. Pose and velocity stay those of the geometric centre.
-    pub fn set_parameters(&mut self, parameters: ObjectParameters, effects: &Effects) {
-        let made_of = Material::new(parameters, effects);
-        if made_of != self.made_of {
+    pub fn set_material(&mut self, made_of: Material<F>) {
+        if made_of != self.tumbling.made_of {
             let (pose, velocity, spin) = (self.pose(), self.centre_velocity(), self.angular_velocity());
             self.take(made_of);
             self.set(&pose, velocity, spin);
         }
     }
 
-    fn take(&mut self, made_of: Material) {
-        let Material { parameters, yaw_factor, slide } = made_of;
-        let mut inertia = self.shape.unit_inertia * parameters.mass;
-        inertia[(2, 2)] *= yaw_factor;
+    fn take(&mut self, made_of: Material<F>) {
+        let mut inertia = self.shape.unit_inertia * made_of.parameters.mass;
+        inertia[(2, 2)] *= made_of.yaw_inertia_factor;
         let tumbling = &mut self.tumbling;
-        (tumbling.mass, tumbling.inertia) = (parameters.mass, inertia);
+        tumbling.inertia = inertia;
         tumbling.inverse_inertia = inertia.try_inverse().unwrap_or_else(Matrix3::identity);
-        let effects = (slide != SlideEffects::default()).then_some(slide);
-        tumbling.friction = TableFriction { nominal: parameters.friction, effects };
-        tumbling.restitution = parameters.restitution;
-        tumbling.gravity = slide.gravity(GRAVITY);
-        (tumbling.drag, tumbling.middle) = (slide.drag(), -parameters.centre_of_mass);
-        (self.made_of, self.motion.made_of) = (made_of, made_of);
+        (tumbling.made_of, self.motion.made_of) = (made_of, made_of);
         self.place_corners();
     }
 
@@ -124,26 +102,27 @@ impl TableObject {
     fn place_corners(&mut self) {
         let (corners, down) = (&self.shape.corners, self.motion.down);
         let lowest = corners.iter().map(|p| p.coords.dot(&down)).fold(f64::NEG_INFINITY, f64::max);
-        let (pivots, lean) =
-            (self.made_of.slide.pivot_reach(), (self.motion.body.rotation * down).angle(&-Vector3::z()));
+        let made_of = &self.tumbling.made_of;
+        let (pivots, centre_of_mass) = (made_of.pivot_reach, made_of.parameters.centre_of_mass);
+        let lean = (self.motion.body.rotation * down).angle(&-Vector3::z());
         let in_base = |p: &Point3<f64>| pivots != 1.0 && lean < TOPPLES && p.coords.dot(&down) > lowest - BASE;
         let base = || corners.iter().filter(|p| in_base(p)).map(|p| p.coords);
         let middle = base().sum::<Vector3<f64>>() / base().count().max(1) as f64;
         for (corner, place) in self.tumbling.corners.iter_mut().zip(corners) {
             let from = if in_base(place) { middle + (place.coords - middle) * pivots } else { place.coords };
-            *corner = from - self.made_of.parameters.centre_of_mass;
+            *corner = from - centre_of_mass;
         }
     }
 
     /// What it does now, to go on from later.
-    pub fn motion(&self) -> &ObjectMotion {
+    pub fn motion(&self) -> &ObjectMotion<F> {
         &self.motion
     }
 
     /// Goes on from a motion of this shape: bit by bit when it is made of the same as then, else from the same pose and
     /// velocity of its geometric centre.
-    pub fn resume(&mut self, motion: &ObjectMotion) {
-        if motion.made_of == self.made_of {
+    pub fn resume(&mut self, motion: &ObjectMotion<F>) {
+        if motion.made_of == self.tumbling.made_of {
             self.motion = *motion;
             self.find_base();
             return;
@@ -159,7 +138,7 @@ impl TableObject {
     /// free one in steps of its own.
     pub fn step(&mut self, dt: f64, presses: &[Press]) -> [Vector3<f64>; 2] {
         // The film's drag is taken from the velocity at the start of a step.
-        let parts = if self.tumbling.drag > 0.0 { (dt / DRAG_STEP).ceil() } else { 1.0 };
+        let parts = if self.tumbling.made_of.drag > 0.0 { (dt / DRAG_STEP).ceil() } else { 1.0 };
         let mut forces = [Vector3::zeros(); 2];
         for _ in 0..parts as usize {
             let now = self.step_once(dt / parts, presses);
@@ -185,7 +164,7 @@ impl TableObject {
                 // Against the push of a hit the friction of so short a step is nothing: it acts on the speed after it.
                 footing.slider.kick(state, &mut wrench, dt);
             }
-            let ending = footing.slider.step(state, &wrench, &tumbling.friction, dt);
+            let ending = footing.slider.step(state, &wrench, &tumbling.made_of.friction, dt);
             match ending {
                 Ending::Rests | Ending::Slides => {
                     motion.body = footing.release(state);
@@ -218,7 +197,7 @@ impl TableObject {
 
     /// Notes on which face it stands, and what it pivots about there.
     fn find_base(&mut self) {
-        if self.made_of.slide.pivot_reach() == 1.0 {
+        if self.tumbling.made_of.pivot_reach == 1.0 {
             return;
         }
         if self.motion.standing.is_some() {
@@ -233,7 +212,7 @@ impl TableObject {
         let (footing, state) = Footing::find(&self.solid(), body, self.tumbling.table_height?, closeness)?;
         let forces = self.tumbling.push((&footing, &state), body, presses, dt)?;
         let wrench = self.tumbling.wrench(&footing, body, presses, &forces);
-        let ending = footing.slider.step(&mut { state }, &wrench, &self.tumbling.friction, dt);
+        let ending = footing.slider.step(&mut { state }, &wrench, &self.tumbling.made_of.friction, dt);
         (!matches!(ending, Ending::Lifts { .. })).then_some((footing, state))
     }
 
@@ -245,7 +224,7 @@ impl TableObject {
     /// Puts the object somewhere: pose of its geometric centre, velocity of that point [m/s], angular velocity [rad/s], base frame.
     pub fn set(&mut self, pose: &Pose<Base, Object>, velocity: Vector3<f64>, angular_velocity: Vector3<f64>) {
         let isometry = pose.isometry();
-        let centre_to_mass = isometry.rotation * self.made_of.parameters.centre_of_mass;
+        let centre_to_mass = isometry.rotation * self.centre_of_mass();
         let body = FreeBody {
             centre: Point3::from(isometry.translation.vector + centre_to_mass),
             rotation: isometry.rotation,
@@ -293,43 +272,26 @@ impl TableObject {
     }
 
     pub(super) fn isometry(&self) -> Isometry3<f64> {
-        self.isometry_of(&self.motion.body)
+        let FreeBody { centre, rotation, .. } = self.motion.body;
+        Isometry3::from_parts((centre - rotation * self.centre_of_mass()).into(), rotation)
     }
 
-    pub(super) fn corners(&self) -> &[Point3<f64>] {
-        &self.shape.corners
+    pub(super) fn shape(&self) -> &CollisionShape {
+        &self.shape
     }
 
-    pub(super) fn half_extents(&self) -> Option<&Vector3<f64>> {
-        self.shape.half_extents.as_ref()
-    }
-
-    /// Distance from the surface (negative inside), nearest point of it, and the outward direction; object frame.
-    pub(super) fn signed_distance(&self, point: &Point3<f64>) -> (f64, Point3<f64>, Vector3<f64>) {
-        self.shape.signed_distance(point)
-    }
-
-    fn isometry_of(&self, body: &FreeBody) -> Isometry3<f64> {
-        Isometry3::from_parts(
-            (body.centre - body.rotation * self.made_of.parameters.centre_of_mass).into(),
-            body.rotation,
-        )
+    fn centre_of_mass(&self) -> Vector3<f64> {
+        self.tumbling.made_of.parameters.centre_of_mass
     }
 
     fn solid(&self) -> Solid<'_> {
         Solid {
             corners: &self.shape.corners,
-            centre_of_mass: self.made_of.parameters.centre_of_mass,
-            mass: self.tumbling.mass,
+            centre_of_mass: self.centre_of_mass(),
+            mass: self.tumbling.made_of.parameters.mass,
             inertia: self.tumbling.inertia,
             support: self.support,
-            pressure_reach: self.made_of.slide.pressure_reach(),
+            pressure_reach: self.tumbling.made_of.pressure_reach,
         }
-    }
-}
-
-impl Material {
-    fn new(parameters: ObjectParameters, effects: &Effects) -> Self {
-        Self { parameters, yaw_factor: effects.hit.yaw_inertia_factor(), slide: effects.slide }
     }
 }

@@ -5,6 +5,8 @@
 //! against the tool. Where the two meet in a point, both ends are that point.
 
 use super::TableObject;
+use super::shape::CollisionShape;
+use crate::sliding::SlidingFriction;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 /// The tool: a segment along the flange's z axis with a radius around it [m].
@@ -38,7 +40,7 @@ const PARALLEL: f64 = 0.99;
 
 /// The tool's axis and the object, in the object's frame.
 struct Approach<'a> {
-    object: &'a TableObject,
+    shape: &'a CollisionShape,
     base_from_object: Isometry3<f64>,
     /// The axis at the flange, and from there to its other end.
     start: Point3<f64>,
@@ -46,7 +48,7 @@ struct Approach<'a> {
     tool: Capsule,
 }
 
-impl TableObject {
+impl<F: SlidingFriction> TableObject<F> {
     /// Where the tool touches the object deepest or comes nearest, for a flange at `base_from_flange`.
     pub fn touch(&self, tool: &Capsule, base_from_flange: &Isometry3<f64>) -> Touch {
         let approach = Approach::new(self, tool, base_from_flange);
@@ -66,12 +68,12 @@ impl TableObject {
 }
 
 impl<'a> Approach<'a> {
-    fn new(object: &'a TableObject, tool: &Capsule, base_from_flange: &Isometry3<f64>) -> Self {
+    fn new<F: SlidingFriction>(object: &'a TableObject<F>, tool: &Capsule, base_from_flange: &Isometry3<f64>) -> Self {
         let base_from_object = object.isometry();
         let object_from_base = base_from_object.inverse();
         let start = object_from_base * Point3::from(base_from_flange.translation.vector);
         let along = object_from_base.rotation * (base_from_flange.rotation * (Vector3::z() * tool.segment));
-        Self { object, base_from_object, start, along, tool: *tool }
+        Self { shape: object.shape(), base_from_object, start, along, tool: *tool }
     }
 
     fn on_axis(&self, share: f64) -> Point3<f64> {
@@ -79,7 +81,7 @@ impl<'a> Approach<'a> {
     }
 
     fn at(&self, share: f64) -> Touch {
-        let (distance, surface, outwards) = self.object.signed_distance(&self.on_axis(share));
+        let (distance, surface, outwards) = self.shape.signed_distance(&self.on_axis(share));
         Touch {
             point: self.base_from_object * surface,
             normal: self.base_from_object.rotation * -outwards,
@@ -89,7 +91,7 @@ impl<'a> Approach<'a> {
 
     /// Share of the axis where it is nearest.
     fn nearest(&self) -> f64 {
-        match self.object.half_extents() {
+        match &self.shape.half_extents {
             Some(half) => self.nearest_to_box(half),
             None => self.nearest_by_search(),
         }
@@ -127,7 +129,7 @@ impl<'a> Approach<'a> {
             return low + (high - low) * (falls / (falls - rises)).min(1.0);
         }
         // Level all along: beside a face any place is as near as the other, inside the box the search tells.
-        if falls == 0.0 && rises == 0.0 && self.object.signed_distance(&self.on_axis(low)).0 < 0.0 {
+        if falls == 0.0 && rises == 0.0 && self.shape.signed_distance(&self.on_axis(low)).0 < 0.0 {
             return self.nearest_by_search();
         }
         low
@@ -136,7 +138,7 @@ impl<'a> Approach<'a> {
     /// The same for any convex body: the distance is convex along a line, so it is least where its slope changes its sign, found
     /// by secants and halvings in turn.
     fn nearest_by_search(&self) -> f64 {
-        let slope = |share: f64| self.along.dot(&self.object.signed_distance(&self.on_axis(share)).2);
+        let slope = |share: f64| self.along.dot(&self.shape.signed_distance(&self.on_axis(share)).2);
         let level = LEVEL * self.tool.segment;
         // A tool most often touches with its tip, or lies along a face with it.
         let mut high = (1.0, slope(1.0));
@@ -162,12 +164,12 @@ impl<'a> Approach<'a> {
     /// Shares between which the object lies beside the axis.
     fn shared_stretch(&self) -> [f64; 2] {
         let along = self.along / self.tool.segment.powi(2);
-        if let Some(half) = self.object.half_extents() {
+        if let Some(half) = &self.shape.half_extents {
             // The box's own shadow on the line: no need to ask all of its corners.
             let (middle, reach) = (-along.dot(&self.start.coords), along.abs().dot(half));
             return [middle - reach, middle + reach].map(|share| share.clamp(0.0, 1.0));
         }
-        let shares = self.object.corners().iter().map(|corner| along.dot(&(corner - self.start)));
+        let shares = self.shape.corners.iter().map(|corner| along.dot(&(corner - self.start)));
         let (low, high) =
             shares.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), share| (low.min(share), high.max(share)));
         [low, high].map(|share| share.clamp(0.0, 1.0))
@@ -175,7 +177,7 @@ impl<'a> Approach<'a> {
 
     /// How far the line of contact reaches from `nearest` towards `limit`: as long as the surface lies the same way.
     fn end_of_line(&self, nearest: f64, limit: f64) -> f64 {
-        let way = |share: f64| self.object.signed_distance(&self.on_axis(share)).2;
+        let way = |share: f64| self.shape.signed_distance(&self.on_axis(share)).2;
         let there = way(nearest);
         if way(limit).dot(&there) > PARALLEL {
             return limit;
@@ -192,15 +194,16 @@ impl<'a> Approach<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::Effects;
+    use crate::physics::Material;
     use crate::scene::{ObjectModel, ObjectShape};
+    use crate::sliding::Coulomb;
     use shared_mem::cell::Support;
     use shared_mem::frames::Pose;
 
     const TOOL: Capsule = Capsule { segment: 0.148, radius: 0.012 };
 
-    fn floating_box() -> TableObject {
-        let model = ObjectModel {
+    fn box_model() -> ObjectModel {
+        ObjectModel {
             shape: ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) },
             mass: 0.3,
             centre_of_mass: Vector3::zeros(),
@@ -208,8 +211,11 @@ mod tests {
             tip_friction: 0.2,
             restitution: 0.0,
             support: Support::Corners,
-        };
-        TableObject::new(&model, None, &Effects::default()).expect("a box")
+        }
+    }
+
+    fn floating_box() -> TableObject<Coulomb> {
+        TableObject::new(&box_model(), Material::nominal(box_model().parameters()), None).expect("a box")
     }
 
     /// An upright tool, `tip` being the end of its segment.
@@ -259,20 +265,11 @@ mod tests {
         let sides = [-1.0, 1.0];
         let corner =
             |k: usize| Point3::new(sides[k & 1] * half.x, sides[(k >> 1) & 1] * half.y, sides[k >> 2] * half.z);
-        let hull = TableObject::new(
-            &ObjectModel {
-                shape: ObjectShape::Mesh { points: (0..8).map(corner).collect(), triangles: Vec::new() },
-                mass: 0.3,
-                centre_of_mass: Vector3::zeros(),
-                friction: 0.3,
-                tip_friction: 0.2,
-                restitution: 0.0,
-                support: Support::Corners,
-            },
-            None,
-            &Effects::default(),
-        );
-        let hull = hull.expect("a hull");
+        let model = ObjectModel {
+            shape: ObjectShape::Mesh { points: (0..8).map(corner).collect(), triangles: Vec::new() },
+            ..box_model()
+        };
+        let hull = TableObject::new(&model, Material::nominal(model.parameters()), None).expect("a hull");
         let mut outside = 0;
         for step in 0..500 {
             let wave = |k: f64| (f64::from(step) * k).sin();

@@ -10,32 +10,21 @@
 
 use super::hit::Press;
 use super::impulses::{Contact, Impulses};
-use crate::effects::TableFriction;
+use super::material::Material;
 use crate::sliding::{FreeBody, SlidingFriction};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// The body and the table below it.
 #[derive(Debug, Clone)]
-pub(super) struct Tumbling {
+pub(super) struct Tumbling<F> {
     /// Corners of the convex hull from the centre of mass, object axes [m].
     pub(super) corners: Vec<Vector3<f64>>,
-    /// Mass [kg].
-    pub(super) mass: f64,
     /// Inertia about the centre of mass, object axes [kg m²].
     pub(super) inertia: Matrix3<f64>,
     pub(super) inverse_inertia: Matrix3<f64>,
     /// Height of the table [m]; `None`: there is none.
     pub(super) table_height: Option<f64>,
-    /// Friction of a corner on the table.
-    pub(super) friction: TableFriction,
-    /// Restitution of a corner, 0 to 1.
-    pub(super) restitution: f64,
-    /// In the table's axes [m/s²].
-    pub(super) gravity: Vector3<f64>,
-    /// Drag of a viscous film under a standing body's base over its speed [N s/m].
-    pub(super) drag: f64,
-    /// The geometric centre from the centre of mass, object axes [m].
-    pub(super) middle: Vector3<f64>,
+    pub(super) made_of: Material<F>,
 }
 
 /// Places that touch at one time: a box's corners and both ends of the tool's line, or those of a mesh. A flat base has
@@ -50,7 +39,7 @@ const PUSH_OUT: f64 = 0.02;
 /// A corner nearer to the table than this touches it [m].
 const TOUCHING: f64 = 1e-9;
 
-impl Tumbling {
+impl<F: SlidingFriction> Tumbling<F> {
     /// Moves `body` by one short step under gravity, the table and the tool; mean force of each press on the body [N].
     pub(super) fn step(&self, body: &mut FreeBody, presses: &[Press], dt: f64) -> [Vector3<f64>; 2] {
         if self.corners.len() + 2 <= OF_BOX {
@@ -65,9 +54,9 @@ impl Tumbling {
         let (velocity, spin) = (body.velocity, body.angular_velocity);
         let gyroscopic = spin.cross(&(turn * (self.inertia * (turn.transpose() * spin))));
         let inverse_inertia = turn * self.inverse_inertia * turn.transpose();
-        body.velocity += self.gravity * dt;
+        body.velocity += self.made_of.gravity * dt;
         body.angular_velocity -= inverse_inertia * gyroscopic * dt;
-        let mut impulses = Impulses::<N>::on(body, 1.0 / self.mass, inverse_inertia);
+        let mut impulses = Impulses::<N>::on(body, 1.0 / self.made_of.parameters.mass, inverse_inertia);
         for press in presses.iter().filter(|press| press.touch.depth > 0.0) {
             let lever = press.touch.point - impulses.centre();
             let before = velocity + spin.cross(&lever);
@@ -75,8 +64,8 @@ impl Tumbling {
         }
         self.add_corners(&mut impulses, &turn, dt);
         impulses.settle();
-        if self.friction.effects.is_some() {
-            impulses.turn_aside(|place, slip| self.friction.aside(place, slip));
+        if self.made_of.friction.turns_aside() {
+            impulses.turn_aside(|place, slip| self.made_of.friction.aside(place, slip));
         }
         let (mut forces, touched) = ([Vector3::zeros(); 2], !impulses.is_empty());
         let pressing = forces.iter_mut().zip(presses).filter(|(_, press)| press.touch.depth > 0.0);
@@ -91,6 +80,7 @@ impl Tumbling {
     /// Adds the corners that would be in the table at the end of the step.
     fn add_corners<const N: usize>(&self, impulses: &mut Impulses<'_, N>, turn: &Matrix3<f64>, dt: f64) {
         let Some(table) = self.table_height else { return };
+        let restitution = self.made_of.parameters.restitution;
         for corner in &self.corners {
             let lever = turn * corner;
             let velocity = impulses.velocity_at(&lever);
@@ -99,21 +89,21 @@ impl Tumbling {
             if gap + rise.min(0.0) * dt > TOUCHING {
                 continue;
             }
-            let least_parting = if self.restitution > 0.0 && rise < -BOUNCE_SPEED {
-                -self.restitution * rise
+            let least_parting = if restitution > 0.0 && rise < -BOUNCE_SPEED {
+                -restitution * rise
             } else if gap > 0.0 {
                 -gap / dt
             } else {
                 (-gap * RECOVERY / dt).min(PUSH_OUT)
             };
-            let friction = self.friction.mu(place.xy(), velocity.xy());
+            let friction = self.made_of.friction.mu(place.xy(), velocity.xy());
             impulses.add(Contact { lever, normal: Vector3::z(), least_parting, friction, ..Contact::NONE });
         }
     }
 }
 
 impl Press {
-    fn contact(&self, lever: Vector3<f64>, velocity: Vector3<f64>, dt: f64) -> Contact {
+    pub(super) fn contact(&self, lever: Vector3<f64>, velocity: Vector3<f64>, dt: f64) -> Contact {
         Contact {
             lever,
             normal: self.touch.normal,

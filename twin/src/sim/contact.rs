@@ -2,13 +2,12 @@
 //! another; a touch begins inside the period where the gap closes, is followed in short steps, and its force acts on both
 //! at the same point with opposite signs.
 
-use super::Drive;
 use super::arm::SimArm;
 use super::tool_path::{ToolMotion, ToolPath};
+use super::{Drive, SimObject};
 use crate::arm::{FlangeMotion, Joints};
 use crate::contact_law::ContactLaw;
 use crate::effects::HitEffects;
-use crate::physics::TableObject;
 use crate::physics::hit::{ContactMotion, Press};
 use crate::physics::touch::{Capsule, Touch};
 use crate::scene::ObjectParameters;
@@ -101,7 +100,7 @@ impl ToolContact {
     }
 
     /// Whether the tool may touch the object within the coming period; asked once in each in which [`Self::advance`] is not.
-    pub(super) fn is_near(&mut self, arm: &SimArm, object: &TableObject) -> bool {
+    pub(super) fn is_near(&mut self, arm: &SimArm, object: &SimObject) -> bool {
         self.approaching(arm, object).is_some()
     }
 
@@ -111,14 +110,14 @@ impl ToolContact {
     }
 
     /// One period of an object that nothing touches.
-    pub(super) fn pass(&self, object: &mut TableObject) {
+    pub(super) fn pass(&self, object: &mut SimObject) {
         for _ in 0..self.parts {
             object.step(TICK / f64::from(self.parts), &[]);
         }
     }
 
     /// One period of arm and object from the simulated time `now_ns` on.
-    pub(super) fn advance(&mut self, arm: &mut SimArm, object: &mut TableObject, drive: &Drive, now_ns: u64) {
+    pub(super) fn advance(&mut self, arm: &mut SimArm, object: &mut SimObject, drive: &Drive, now_ns: u64) {
         (self.record.mean_force, self.record.on_tool) = (0.0, Default::default());
         let Some((tool, motion, from)) = self.approaching(arm, object) else {
             arm.period(drive);
@@ -139,7 +138,7 @@ impl ToolContact {
     }
 
     /// Tool, law and the flange's motion where the gap may close within the coming period.
-    fn approaching(&mut self, arm: &SimArm, object: &TableObject) -> Option<(Capsule, ContactMotion, FlangeMotion)> {
+    fn approaching(&mut self, arm: &SimArm, object: &SimObject) -> Option<(Capsule, ContactMotion, FlangeMotion)> {
         let (tool, motion) = self.pair.filter(|_| arm.model().has_geometry())?;
         if self.record.clear_periods > 0 {
             self.record.clear_periods -= 1;
@@ -155,12 +154,12 @@ impl ToolContact {
     }
 
     /// Whether the gap may close within a period.
-    pub(super) fn may_touch(&self, arm: &SimArm, object: &TableObject) -> bool {
+    pub(super) fn may_touch(&self, arm: &SimArm, object: &SimObject) -> bool {
         let Some((tool, _)) = self.pair.as_ref().filter(|_| arm.model().has_geometry()) else { return false };
         self.record.clear_periods == 0 && matches!(self.outlook(tool, arm, object), Outlook::Near(_))
     }
 
-    fn outlook(&self, tool: &Capsule, arm: &SimArm, object: &TableObject) -> Outlook {
+    fn outlook(&self, tool: &Capsule, arm: &SimArm, object: &SimObject) -> Outlook {
         let flange = arm.flange_motion();
         let held = self.held(&flange.pose);
         let centre = Point3::from(object.pose().isometry().translation.vector);
@@ -189,7 +188,7 @@ impl ToolContact {
     }
 
     /// Gap between object and tool for an arm at `q` [m]; without bound where there is no tool.
-    pub(super) fn gap_at(&self, arm: &SimArm, q: &Joints, object: &TableObject) -> f64 {
+    pub(super) fn gap_at(&self, arm: &SimArm, q: &Joints, object: &SimObject) -> f64 {
         let Some((tool, _)) = self.pair.as_ref().filter(|_| arm.model().has_geometry()) else { return f64::INFINITY };
         -object.touch(tool, &self.held(&arm.model().flange(q).isometry())).depth
     }
@@ -208,7 +207,7 @@ fn time_to_close(gap: f64, speed: f64) -> f64 {
 /// Tool and object close to each other.
 struct Close<'a> {
     contact: &'a mut ToolContact,
-    object: &'a mut TableObject,
+    object: &'a mut SimObject,
     tool: &'a Capsule,
     motion: &'a ContactMotion,
 }

@@ -26,8 +26,8 @@ pub use state::SimState;
 
 use crate::arm::{ArmModel, GainError, JointState, Joints, MassProperties};
 use crate::control::{CommandTrack, Drive, Plant, Reading};
-use crate::effects::{CameraEffects, Effects};
-use crate::physics::TableObject;
+use crate::effects::{CameraEffects, Effects, TableFriction};
+use crate::physics::{ObjectMotion, TableObject};
 use crate::scene::{NamedPoses, ObjectModel, ObjectParameters, SceneSnapshot, nominal_centre_of_mass};
 use arm::SimArm;
 use contact::{ContactRecord, ToolContact};
@@ -39,12 +39,16 @@ use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
 use table::SolidTable;
 
+/// An object on a table with whatever friction effects give it.
+type SimObject = TableObject<TableFriction>;
+type SimObjectMotion = ObjectMotion<TableFriction>;
+
 /// The simulated cell.
 #[derive(Clone)]
 pub struct SimCell {
     description: Description,
     arm: Option<SimArm>,
-    object: Option<TableObject>,
+    object: Option<SimObject>,
     contact: ToolContact,
     table: Option<SolidTable>,
     camera: CameraEffects,
@@ -88,7 +92,7 @@ impl SimCell {
                 centre_of_mass =
                     cell.object().map_or(centre_of_mass, |object| nominal_centre_of_mass(object, &model.shape));
                 let table = cell.table.ok_or(SimError::NoTable)?.height;
-                let mut object = TableObject::new(&model, Some(table), &effects)?;
+                let mut object = SimObject::new(&model, effects.material(model.parameters()), Some(table))?;
                 let ([x, y], yaw) = cell.object_start();
                 let place = Vector3::new(x, y, table + model.shape.half_extents().z);
                 let start = Isometry3::new(place, Vector3::z() * yaw);
@@ -127,7 +131,7 @@ impl SimCell {
             arm.set_parameters(controller.as_ref(), theta, &effects.arm)?;
         }
         if let (Some(object), Some(parameters)) = (&mut self.object, parameters) {
-            object.set_parameters(parameters, &effects);
+            object.set_material(effects.material(parameters));
             self.contact.set_parameters(tool.as_ref(), &parameters, &effects.hit);
         }
         self.camera = effects.camera;
@@ -245,7 +249,7 @@ impl SimCell {
 
     /// The object's geometric centre, where there is an object.
     pub fn object(&self) -> Option<Pose<Base, Object>> {
-        self.object.as_ref().filter(|_| self.takes_part.object).map(TableObject::pose)
+        self.object.as_ref().filter(|_| self.takes_part.object).map(SimObject::pose)
     }
 
     /// The object's velocity at its geometric centre [m/s] and its angular velocity [rad/s].
@@ -271,7 +275,7 @@ impl SimCell {
 
     /// Whether the object stands still and does so until something touches it. True where there is none.
     pub fn object_rests(&self) -> bool {
-        self.object.as_ref().filter(|_| self.takes_part.object).is_none_or(TableObject::rests)
+        self.object.as_ref().filter(|_| self.takes_part.object).is_none_or(SimObject::rests)
     }
 
     /// Gap between tool and object if the arm were at `q` [m]; without bound where one of them takes no part.

@@ -1,15 +1,14 @@
 //! The whole state of a simulated cell, to go on from later. Called by [`crate::rollout`].
 
 use super::contact::ContactRecord;
-use super::{SimCell, TakesPart};
+use super::{SimCell, SimObjectMotion, TakesPart};
 use crate::control::ArmMotion;
-use crate::physics::ObjectMotion;
 
 /// The whole state of a cell at one moment, without the noise of its sensors.
 #[derive(Debug)]
 pub struct SimState {
     arm: Option<ArmMotion>,
-    object: Option<ObjectMotion>,
+    object: Option<SimObjectMotion>,
     contact: ContactRecord,
     takes_part: TakesPart,
     time_ns: u64,

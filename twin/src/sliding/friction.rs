@@ -6,7 +6,7 @@
 use nalgebra::Vector2;
 
 /// Coefficient of friction between base and table.
-pub trait SlidingFriction {
+pub trait SlidingFriction: Copy + PartialEq {
     /// Coefficient where the base slips over `point` (world, on the table [m]) with `velocity` (world [m/s]).
     ///
     /// It must be finite and not negative. At rest `velocity` is zero and the coefficient is the one that has to be
@@ -18,6 +18,12 @@ pub trait SlidingFriction {
     #[inline]
     fn aside(&self, _point: Vector2<f64>, _velocity: Vector2<f64>) -> f64 {
         0.0
+    }
+
+    /// Whether [`SlidingFriction::aside`] may be other than 0.
+    #[inline]
+    fn turns_aside(&self) -> bool {
+        false
     }
 }
 

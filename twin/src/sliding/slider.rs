@@ -66,23 +66,12 @@ struct Instant<const N: usize> {
 
 impl Slider {
     /// Moves `state` by `dt` seconds under `wrench`, constant meanwhile, world axes.
-    pub fn step(
-        &self,
-        state: &mut PlanarState,
-        wrench: &Wrench,
-        friction: &(impl SlidingFriction + ?Sized),
-        dt: f64,
-    ) -> Ending {
+    pub fn step(&self, state: &mut PlanarState, wrench: &Wrench, friction: &impl SlidingFriction, dt: f64) -> Ending {
         with_places!(self.patch, places => Step { slider: self, places, wrench, friction }.take(state, dt))
     }
 
     /// Rates of velocity and yaw rate of a moving body now, world axes; zeros at rest and where the body would lift.
-    pub fn rates(
-        &self,
-        state: &PlanarState,
-        wrench: &Wrench,
-        friction: &(impl SlidingFriction + ?Sized),
-    ) -> Vector3<f64> {
+    pub fn rates(&self, state: &PlanarState, wrench: &Wrench, friction: &impl SlidingFriction) -> Vector3<f64> {
         if state.is_at_rest() {
             return Vector3::zeros();
         }
@@ -106,7 +95,7 @@ impl Slider {
     }
 }
 
-impl<F: SlidingFriction + ?Sized, const N: usize> Step<'_, F, N> {
+impl<F: SlidingFriction, const N: usize> Step<'_, F, N> {
     fn take(&self, state: &mut PlanarState, dt: f64) -> Ending {
         let mut left = dt;
         while left > 1e-12 * dt {

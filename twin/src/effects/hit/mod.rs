@@ -43,9 +43,4 @@ impl HitEffects {
     pub fn tool_shift(&self) -> Option<Translation3<f64>> {
         self.tool_offset.map(|effect| effect.shift())
     }
-
-    /// Inertia about the object's z axis over that of the homogeneous body.
-    pub fn yaw_inertia_factor(&self) -> f64 {
-        self.object_inertia.map_or(1.0, |effect| effect.factor)
-    }
 }

@@ -38,7 +38,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::effects) struct ObjectInertia {
-    pub(super) factor: f64,
+    pub(in crate::effects) factor: f64,
 }
 
 #[cfg(test)]

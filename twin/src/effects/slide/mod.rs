@@ -1,5 +1,6 @@
 //! Effects on the slide: what the table's friction depends on, where the base presses, what else pushes the object.
-//! Asked once when a cell is made, but for the friction itself: [`TableFriction`] is asked for every place and slip.
+//! Asked once when a cell is made ([`super::Effects::material`]), but for the friction itself: [`TableFriction`] is asked for
+//! every place and slip.
 
 pub(super) mod anisotropic_friction;
 pub(super) mod friction_patch;
@@ -11,8 +12,9 @@ pub(super) mod test_slide;
 pub(super) mod velocity_dependent_friction;
 pub(super) mod viscous_sliding_drag;
 
-use crate::sliding::SlidingFriction;
-use nalgebra::{Vector2, Vector3};
+use crate::physics::Material;
+use crate::sliding::{Coulomb, SlidingFriction};
+use nalgebra::Vector2;
 
 /// The effects on a slide that are installed.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -27,25 +29,19 @@ pub struct SlideEffects {
 }
 
 impl SlideEffects {
-    /// Gravity on the object, in the table's own axes [m/s^2]; `g` is its size.
-    pub fn gravity(&self, g: f64) -> Vector3<f64> {
-        let level = Vector3::new(0.0, 0.0, -g);
-        self.table_tilt.map_or(level, |effect| effect.gravity(level))
-    }
-
-    /// Force of a viscous film under the whole base over the base's velocity [N s/m]; 0 without one.
-    pub fn drag(&self) -> f64 {
-        self.viscous_sliding_drag.map_or(0.0, |effect| effect.drag)
-    }
-
-    /// Reach of the pressure from the middle of the base, over the nominal one.
-    pub fn pressure_reach(&self) -> f64 {
-        self.pressure_distribution.map_or(1.0, |effect| effect.reach)
-    }
-
-    /// Distance from the middle of the base of what a tipping object pivots about, over that of its corners.
-    pub fn pivot_reach(&self) -> f64 {
-        self.pressure_distribution.map_or(1.0, |effect| effect.pivot)
+    /// An object on the real table.
+    pub(super) fn material(&self, nominal: Material<Coulomb>) -> Material<TableFriction> {
+        let Material { parameters, yaw_inertia_factor, gravity, drag, pressure_reach, pivot_reach, .. } = nominal;
+        let effects = (*self != Self::default()).then_some(*self);
+        Material {
+            parameters,
+            yaw_inertia_factor,
+            friction: TableFriction { nominal: nominal.friction.0, effects },
+            gravity: self.table_tilt.map_or(gravity, |effect| effect.gravity(gravity)),
+            drag: self.viscous_sliding_drag.map_or(drag, |effect| effect.drag),
+            pressure_reach: self.pressure_distribution.map_or(pressure_reach, |effect| effect.reach),
+            pivot_reach: self.pressure_distribution.map_or(pivot_reach, |effect| effect.pivot),
+        }
     }
 }
 
@@ -68,6 +64,11 @@ impl SlidingFriction for TableFriction {
     fn aside(&self, _point: Vector2<f64>, velocity: Vector2<f64>) -> f64 {
         let rough = self.effects.as_ref().and_then(|effects| effects.anisotropic_friction.as_ref());
         rough.map_or(0.0, |effect| self.nominal * effect.aside(velocity))
+    }
+
+    #[inline]
+    fn turns_aside(&self) -> bool {
+        self.effects.is_some_and(|effects| effects.anisotropic_friction.is_some())
     }
 }
 

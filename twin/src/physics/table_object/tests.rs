@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::scene::ObjectShape;
-use shared_mem::theta::Theta;
+use crate::sliding::Coulomb;
+use shared_mem::cell::GRAVITY;
 
 const STEP: f64 = 2.5e-4;
 
@@ -18,19 +19,19 @@ fn box_model(friction: f64, restitution: f64) -> ObjectModel {
     }
 }
 
-fn placed(model: &ObjectModel, pose: Isometry3<f64>, velocity: Vector3<f64>) -> TableObject {
-    let mut object = TableObject::new(model, Some(0.0), &Effects::default()).expect("a box");
+fn placed(model: &ObjectModel, pose: Isometry3<f64>, velocity: Vector3<f64>) -> TableObject<Coulomb> {
+    let mut object = TableObject::new(model, Material::nominal(model.parameters()), Some(0.0)).expect("a box");
     object.set(&Pose::from_isometry(pose), velocity, Vector3::zeros());
     object
 }
 
-fn run(object: &mut TableObject, seconds: f64) {
+fn run(object: &mut TableObject<Coulomb>, seconds: f64) {
     for _ in 0..(seconds / STEP).round() as usize {
         object.step(STEP, &[]);
     }
 }
 
-fn height(object: &TableObject) -> f64 {
+fn height(object: &TableObject<Coulomb>) -> f64 {
     object.pose().position()[2]
 }
 
@@ -54,7 +55,7 @@ fn what_is_resumed_under_other_parameters_is_where_it_was() {
     let mut object = placed(&box_model(0.3, 0.0), start, Vector3::x() * 0.2);
     let other = ObjectModel { mass: 0.5, centre_of_mass: Vector3::new(-0.01, 0.0, 0.0), ..box_model(0.3, 0.0) };
     for model in [other, box_model(0.3, 0.0)] {
-        object.set_parameters(model.parameters(), &Effects::default());
+        object.set_material(Material::nominal(model.parameters()));
         let motion = *object.motion();
         object.resume(&motion);
         let moved = start.inverse() * object.isometry();
@@ -73,7 +74,8 @@ fn a_dropped_box_does_not_hover() {
 
 #[test]
 fn a_falling_box_follows_gravity() {
-    let mut object = TableObject::new(&box_model(0.3, 0.0), None, &Effects::default()).expect("a box");
+    let model = box_model(0.3, 0.0);
+    let mut object = TableObject::new(&model, Material::nominal(model.parameters()), None).expect("a box");
     object.set(&Pose::from_isometry(Isometry3::translation(0.0, 0.0, 5.0)), Vector3::x(), Vector3::z() * 2.0);
     run(&mut object, 0.5);
     let fallen = 5.0 - height(&object);
@@ -87,7 +89,8 @@ fn velocities_are_those_of_the_geometric_centre() {
         nalgebra::Translation3::new(0.3, 0.2, 1.0),
         UnitQuaternion::from_euler_angles(0.3, 0.2, 1.0),
     );
-    let mut object = TableObject::new(&box_model(0.3, 0.0), None, &Effects::default()).expect("a box");
+    let model = box_model(0.3, 0.0);
+    let mut object = TableObject::new(&model, Material::nominal(model.parameters()), None).expect("a box");
     let (velocity, spin) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, -2.0, 3.0));
     object.set(&Pose::from_isometry(turned), velocity, spin);
     let centre = Point3::from(turned.translation.vector);
@@ -144,13 +147,12 @@ fn a_bounce_returns_the_restitution() {
 #[test]
 fn on_feet_a_box_topples_from_a_slope_on_which_its_corners_hold_it() {
     let lean = |pivot: f64| {
-        let blocks = format!(
-            "[[effect]]\nname = \"table_tilt\"\ntilt = [0.3, 0.0]\n[[effect]]\nname = \"pressure_distribution\"\nreach = 0.4\npivot = {pivot}"
-        );
-        let theta: Theta =
-            shared_mem::toml_file::parse(&blocks, std::path::Path::new("theta.toml")).expect("a theta.toml");
-        let effects = Effects::from_theta(&theta.effects, 0).expect("known effects");
-        let mut object = TableObject::new(&box_model(1.0, 0.0), Some(0.0), &effects).expect("a box");
+        let model = box_model(1.0, 0.0);
+        // Down on a table that leans by 0.3 rad about its x axis.
+        let gravity = Vector3::new(0.0, 0.3f64.sin(), -0.3f64.cos()) * GRAVITY;
+        let nominal = Material::nominal(model.parameters());
+        let made_of = Material { gravity, pressure_reach: 0.4, pivot_reach: pivot, ..nominal };
+        let mut object = TableObject::new(&model, made_of, Some(0.0)).expect("a box");
         object.set(&Pose::from_isometry(Isometry3::translation(0.0, 0.0, 0.05)), Vector3::zeros(), Vector3::zeros());
         run(&mut object, 1.0);
         (object.isometry().rotation * Vector3::z()).angle(&Vector3::z())

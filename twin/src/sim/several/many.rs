@@ -1,12 +1,12 @@
 //! All objects, the table and the tool in one world of many bodies. The arm stays the cell's own, with its controller and effects:
 //! the world meets its inertia at the tool, and what touches the tool acts as a torque on the joints for that period.
 
-use super::super::SimCell;
 use super::super::arm::SimArm;
 use super::super::contact::Held;
+use super::super::{SimCell, SimObject};
 use crate::arm::{JointState, Joints, MAX_JOINTS};
 use crate::control::Drive;
-use crate::physics::{Hull, TableObject};
+use crate::physics::Hull;
 use crate::scene::ObjectModel;
 use crate::sim::SimError;
 use crate::world::{ArmPlan, BodyMotion, BodyPlan, Hold, Piece, STEP, World, box_hull};
@@ -79,7 +79,7 @@ impl ManyBodies {
     }
 
     /// Puts all objects where they are by themselves.
-    pub(super) fn take_up<'a>(&mut self, objects: impl Iterator<Item = &'a TableObject>) {
+    pub(super) fn take_up<'a>(&mut self, objects: impl Iterator<Item = &'a SimObject>) {
         for (body, object) in self.objects.clone().zip(objects) {
             let (velocity, spin) = (object.centre_velocity(), object.angular_velocity());
             self.world.set_motion(body, &BodyMotion { pose: object.pose().isometry(), velocity, spin });
@@ -170,7 +170,7 @@ impl Member {
     /// [`SimError::Body`] where its mesh has no volume.
     pub(super) fn rigid(
         name: ObjectName,
-        object: &TableObject,
+        object: &SimObject,
         model: &ObjectModel,
         start: Isometry3<f64>,
     ) -> Result<Self, SimError> {

@@ -15,11 +15,10 @@ mod many;
 mod state;
 
 use super::contact::ToolContact;
-use super::{SimCell, SimError};
+use super::{SimCell, SimError, SimObject};
 use crate::arm::{GainError, JointState, Joints, MassProperties};
 use crate::control::Drive;
 use crate::effects::{Stage, find};
-use crate::physics::TableObject;
 use crate::scene::{CellBody, NamedPoses, ObjectModel, SceneSnapshot, cell_bodies, starts};
 use linked::linked;
 use many::{ManyBodies, Member};
@@ -57,7 +56,7 @@ pub struct SimScene {
 
 /// One of the objects beside the first.
 struct Beside {
-    object: TableObject,
+    object: SimObject,
     contact: ToolContact,
 }
 
@@ -258,7 +257,7 @@ impl SimScene {
 
     /// Whether two objects are near each other. While nothing moves that need not be looked at twice.
     fn are_near(&mut self) -> bool {
-        let still = self.objects().all(TableObject::rests);
+        let still = self.objects().all(SimObject::rests);
         if self.known_apart && still {
             return false;
         }
@@ -298,7 +297,7 @@ impl SimScene {
         self.many = Some(many);
     }
 
-    fn objects(&self) -> impl Iterator<Item = &TableObject> {
+    fn objects(&self) -> impl Iterator<Item = &SimObject> {
         self.cell.object.iter().chain(self.others.iter().map(|other| &other.object))
     }
 
@@ -306,7 +305,7 @@ impl SimScene {
     pub fn object(&self, number: usize) -> Option<Pose<Base, Object>> {
         match &self.many {
             Some(many) if self.is_together => many.pose(number),
-            _ => self.objects().nth(number).map(TableObject::pose),
+            _ => self.objects().nth(number).map(SimObject::pose),
         }
     }
 
@@ -372,6 +371,6 @@ fn refuse_effects(theta: Option<&Theta>, articulated: &shared_mem::cell::Object)
 }
 
 /// Of the fastest point of an object, at most [m/s].
-fn speed(object: &TableObject) -> f64 {
+fn speed(object: &SimObject) -> f64 {
     object.centre_velocity().norm() + object.angular_velocity().norm() * object.bounding_radius()
 }

@@ -2,16 +2,15 @@
 
 use super::SimScene;
 use super::many::ManyBodies;
-use crate::physics::ObjectMotion;
-use crate::sim::SimState;
 use crate::sim::contact::ContactRecord;
+use crate::sim::{SimObjectMotion, SimState};
 use shared_mem::msg::object::ObjectName;
 
 /// The state of a cell and of all its objects at one moment, without the noise of its sensors.
 #[derive(Clone)]
 pub struct SceneState {
     cell: SimState,
-    others: Vec<(ObjectMotion, ContactRecord)>,
+    others: Vec<(SimObjectMotion, ContactRecord)>,
     many: Option<ManyBodies>,
     is_together: bool,
     known_apart: bool,

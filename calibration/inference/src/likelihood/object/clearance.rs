@@ -5,11 +5,11 @@ use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::msg::joints_from;
 use shared_mem::recording::Clip;
 use twin::arm::ArmModel;
-use twin::effects::Effects;
-use twin::physics::TableObject;
 use twin::physics::touch::Capsule;
+use twin::physics::{Material, TableObject};
 use twin::replay::in_model_order;
 use twin::scene::ObjectModel;
+use twin::sliding::Coulomb;
 
 /// Tool and object are apart when the tracked gap is wider than this [m]: several sigmas of any usable tracker.
 const APART_GAP: f64 = 4e-3;
@@ -28,7 +28,7 @@ const TOUCH_MARGIN_NS: u64 = 60_000_000;
 pub struct Clearance {
     arm: ArmModel,
     tool: Capsule,
-    object: TableObject,
+    object: TableObject<Coulomb>,
     clip: Clip,
 }
 
@@ -39,7 +39,7 @@ impl Clearance {
         let tool = cell.tool.as_ref()?;
         let tool = Capsule { segment: tool.length - tool.radius, radius: tool.radius };
         let model = ObjectModel::new(cell, None).ok()??;
-        let object = TableObject::new(&model, None, &Effects::default()).ok()?;
+        let object = TableObject::new(&model, Material::nominal(model.parameters()), None).ok()?;
         let clip = in_model_order(clip.clone(), &arm).ok()?;
         (!clip.measured.is_empty()).then_some(Self { arm, tool, object, clip })
     }

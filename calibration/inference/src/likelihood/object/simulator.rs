@@ -26,8 +26,7 @@ use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
 use std::sync::Arc;
 use twin::arm::{Joints, MAX_JOINTS};
-use twin::effects::Effects;
-use twin::physics::Outline;
+use twin::physics::{Material, Outline};
 use twin::scene::ObjectModel;
 
 /// The object has been touched once it is so far from where it stood [m]; what an engine's contact sinks in by is less.
@@ -113,7 +112,7 @@ pub(super) fn composed(theirs: &Outcome, with: &Outcome, without: &Outcome) -> O
 
 /// The object's numbers, without what effects change of them.
 fn body(model: &ObjectModel, cell: &Cell) -> Result<ObjectBody, Impossible> {
-    let inertia = Outline::of(model, &Effects::default()).map_err(impossible)?.inertia;
+    let inertia = Outline::of(model, &Material::nominal(model.parameters())).map_err(impossible)?.inertia;
     let mesh = cell.object().and_then(|object| object.mesh.as_ref()).map(|mesh| cell.folder.join(mesh));
     let mesh = mesh.map(|mesh| place::from_anywhere(&mesh).display().to_string());
     Ok(ObjectBody {
