@@ -96,24 +96,24 @@ pub enum PumpError {
 pub struct Pump {
     handle: JoinHandle<Result<PumpReport, TransportError>>,
     stop: Arc<AtomicBool>,
-    rounds: Rounds,
+    watchdog: Watchdog,
     /// It once did.
     stood_still: bool,
 }
 
-/// Whether a thread still goes its rounds, as seen from another one.
+/// A watchdog of another thread: whether its count of cycles still grows.
 #[derive(Debug, Default)]
-struct Rounds {
-    /// Counted by the thread.
+struct Watchdog {
+    /// Cycles, counted by the thread.
     count: Arc<AtomicU64>,
-    /// At the last look.
+    /// Cycles at the last look.
     seen: u64,
-    /// Looks since the last round.
+    /// Looks since it last grew.
     still: u32,
 }
 
-impl Rounds {
-    /// `true` while the last round is not too many looks ago.
+impl Watchdog {
+    /// `true` while it grew not too many looks ago.
     fn look(&mut self) -> bool {
         let count = self.count.load(Ordering::Relaxed);
         self.still = if count == self.seen { self.still.saturating_add(1) } else { 0 };
@@ -138,8 +138,8 @@ impl Pump {
     /// [`TransportError::Full`] when another bridge runs, other variants when shared memory fails, [`ThreadError`] when
     /// the operating system cannot make a thread.
     pub fn start(rings: Rings) -> Result<Self, PumpError> {
-        let (stop, rounds) = (Arc::new(AtomicBool::new(false)), Rounds::default());
-        let (told, count) = (stop.clone(), rounds.count.clone());
+        let (stop, watchdog) = (Arc::new(AtomicBool::new(false)), Watchdog::default());
+        let (stopping, count) = (stop.clone(), watchdog.count.clone());
         let body = move |opened: mpsc::Sender<Result<(), PumpError>>| {
             // Just above ordinary threads: the camera's rendering would make states late by milliseconds otherwise. Where
             // it is not granted, states are as fresh as the scheduler lets them be.
@@ -156,12 +156,12 @@ impl Pump {
                 }
             };
             let _gone = opened.send(Ok(()));
-            let report = run(rings, &node, &ports, &told, &count);
+            let report = run(rings, &node, &ports, &stopping, &count);
             drop(node);
             report
         };
         let handle = starting::start("pump", body)?;
-        Ok(Self { handle, stop, rounds, stood_still: false })
+        Ok(Self { handle, stop, watchdog, stood_still: false })
     }
 
     /// The thread, to wake it.
@@ -172,7 +172,7 @@ impl Pump {
     /// `false` when the pump has ended by itself, or stands still: nobody sees the arm any more. Asked about a hundred
     /// times a second.
     pub fn is_well(&mut self) -> bool {
-        let goes_on = self.rounds.look();
+        let goes_on = self.watchdog.look();
         self.stood_still |= !goes_on && !self.handle.is_finished();
         goes_on && !self.handle.is_finished()
     }
@@ -317,11 +317,11 @@ mod tests {
 
     #[test]
     fn a_pump_that_goes_no_round_is_noticed_and_one_that_goes_on_is_well_again() {
-        let mut rounds = Rounds::default();
+        let mut watchdog = Watchdog::default();
         for _ in 0..2 {
-            rounds.count.fetch_add(1, Ordering::Relaxed);
-            assert!((0..STILL_LOOKS).all(|_| rounds.look()));
-            assert!(!rounds.look(), "it has not moved for {STILL_LOOKS} looks");
+            watchdog.count.fetch_add(1, Ordering::Relaxed);
+            assert!((0..STILL_LOOKS).all(|_| watchdog.look()));
+            assert!(!watchdog.look(), "it has not moved for {STILL_LOOKS} looks");
         }
     }
 
@@ -330,7 +330,7 @@ mod tests {
         Pump {
             handle: thread::spawn(body),
             stop: Arc::new(AtomicBool::new(false)),
-            rounds: Rounds::default(),
+            watchdog: Watchdog::default(),
             stood_still: false,
         }
     }

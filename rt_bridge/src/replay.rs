@@ -1,5 +1,5 @@
 //! A recording as an arm: its states come at the pace they were recorded with, its commands are what was commanded then.
-//! What the bridge is told to play is refused. Beside it go the recording's pictures ([`crate::camera`]), and its force sensor and
+//! What the bridge is asked to play is refused. Beside it go the recording's pictures ([`crate::camera`]), and its force sensor and
 //! gripper ([`Instruments`]).
 
 mod instruments;

@@ -4,7 +4,7 @@
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-/// Longest time told apart: 10 s; longer ones count as this [ns].
+/// Longest time resolved: 10 s; longer ones count as this [ns].
 const LONGEST_NS: u64 = 10_000_000_000;
 
 /// A distribution of times [ns], exact to 0.1 %.

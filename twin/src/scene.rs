@@ -243,9 +243,9 @@ mod tests {
             (ObjectParameters { restitution: 1.5, ..fine }, "restitution cannot be 1.5"),
             (ObjectParameters { centre_of_mass: Vector3::new(0.0, f64::NAN, 0.0), ..fine }, "centre of mass cannot be"),
         ];
-        for (parameters, told) in faults {
-            let error = parameters.check().expect_err(told).to_string();
-            assert!(error.contains(told) && error.contains("give") && !error.contains('\n'), "{error}");
+        for (parameters, expected) in faults {
+            let error = parameters.check().expect_err(expected).to_string();
+            assert!(error.contains(expected) && error.contains("give") && !error.contains('\n'), "{error}");
         }
     }
 

@@ -56,7 +56,7 @@ pub trait Arm: Send {
     fn clock(&self) -> Clock;
 
     /// Whether the arm goes on with its last acceleration in a period for which no position command came; `false` for one
-    /// that waits where it was told to be.
+    /// that waits where it was commanded to be.
     fn extrapolates(&self) -> bool {
         false
     }

@@ -55,7 +55,7 @@ pub enum CameraError {
 }
 
 impl Camera {
-    /// Starts the simulated camera on the scenes of a simulated cell, under effects that nobody is told; `splats`: a folder
+    /// Starts the simulated camera on the scenes of a simulated cell, under hidden effects; `splats`: a folder
     /// with the robot's links as it shall show them; `held`: where the arm holds it, its optical frame in the flange's.
     ///
     /// # Errors
@@ -111,8 +111,8 @@ impl Camera {
         body: impl FnOnce(Sender<Result<(), CameraError>>, &AtomicBool) + Send + 'static,
     ) -> Result<Self, CameraError> {
         let stop = Arc::new(AtomicBool::new(false));
-        let told = stop.clone();
-        let handle = starting::start("camera", move |opened| body(opened, &told))?;
+        let stopping = stop.clone();
+        let handle = starting::start("camera", move |opened| body(opened, &stopping))?;
         Ok(Self { stop, handle: Some(handle) })
     }
 }

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How long the fingers may take; finding their range takes several seconds.
 const LONGEST: Duration = Duration::from_secs(30);
-/// States in a row without motion after which the fingers have come to the end of what they were told. A gripper reports
+/// States in a row without motion after which the fingers have come to the end of what they were commanded. A gripper reports
 /// fifty times a second, and takes an order before its next report.
 const REST: u32 = 35;
 /// Less than this is standing still [m].

@@ -99,11 +99,11 @@ fn success((): ()) -> ExitCode {
 /// A flag that Ctrl-C and `SIGTERM` set, and the end of `parent`, where one started this program.
 fn stop_flag(parent: Option<u32>) -> anyhow::Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
-    let told = stop.clone();
-    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))?;
+    let stopping = stop.clone();
+    ctrlc::set_handler(move || stopping.store(true, Ordering::Relaxed))?;
     if let Some(parent) = parent {
-        let told = stop.clone();
-        parent::when_gone(parent, move || told.store(true, Ordering::Relaxed))?;
+        let stopping = stop.clone();
+        parent::when_gone(parent, move || stopping.store(true, Ordering::Relaxed))?;
     }
     Ok(stop)
 }

@@ -18,7 +18,7 @@ pub(crate) const RETRY: Duration = Duration::from_secs(1);
 pub trait Device {
     /// What it reports.
     type Sample;
-    /// What it can be told.
+    /// Its commands.
     type Order;
 
     /// One round: hands `order` over and reads. Takes as long as the device's rate asks for, a second at most. `None` where

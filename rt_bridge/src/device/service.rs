@@ -62,7 +62,7 @@ impl Service {
         notices: Sender<Notice>,
     ) -> Result<Self, ServiceError> {
         let stop = Arc::new(AtomicBool::new(false));
-        let told = stop.clone();
+        let stopping = stop.clone();
         let body = move |opened: Sender<Result<(), ServiceError>>| {
             // Device and ports belong to the thread that makes them.
             let start = || -> Result<_, ServiceError> {
@@ -81,7 +81,7 @@ impl Service {
             let _gone = opened.send(Ok(()));
             let mut attendance = Attendance::new(device);
             let ignored = || node.newly_ignored();
-            let ended = attend(first, &mut open, &mut lines, &mut attendance, ignored, &notices, &told);
+            let ended = attend(first, &mut open, &mut lines, &mut attendance, ignored, &notices, &stopping);
             ended.err().map(|e| format!("{name} stopped: {e}")).or_else(|| attendance.missing())
         };
         let handle = starting::start(name, body)?;

@@ -2,7 +2,7 @@
 //! them this machine has, as far as that can be seen before a robot moves. Judges only; what is read is in `readings`.
 
 use super::Finding;
-use super::readings::{Readings, Way};
+use super::readings::{NetworkPath, Readings};
 use crate::times::in_words;
 
 /// What a network interface may keep packets back for and leave the loop its share of the millisecond [us].
@@ -13,8 +13,8 @@ const GOOD_ROUND_TRIP_US: f64 = 400.0;
 /// One finding for each cause, as far as it was read.
 pub(super) fn judge(readings: &Readings) -> Vec<Finding> {
     let mut findings = vec![kernel(readings), governor(readings), sleep(readings), load(readings)];
-    if let Some(way) = &readings.way {
-        findings.extend([interface(way), round_trip(way)]);
+    if let Some(network) = &readings.network {
+        findings.extend([interface(network), round_trip(network)]);
     }
     findings
 }
@@ -72,15 +72,15 @@ fn load(readings: &Readings) -> Finding {
     }
 }
 
-fn interface(way: &Way) -> Finding {
-    let Some(name) = &way.interface else {
+fn interface(network: &NetworkPath) -> Finding {
+    let Some(name) = &network.interface else {
         return Finding::ok("interface", "the one that leads to the robot is not known");
     };
-    if way.is_wireless {
+    if network.is_wireless {
         let remedy = "connect the robot by cable, directly";
         return Finding::warning("interface", format!("{name} is wireless"), remedy).delaying();
     }
-    let Some(held) = way.held else {
+    let Some(held) = network.held else {
         return Finding::ok("interface", format!("{name} leads to the robot; it hands on packets by itself"));
     };
     let found = format!("{name} keeps packets back for {} us in and {} us out", held.receive_us, held.send_us);
@@ -94,8 +94,8 @@ fn interface(way: &Way) -> Finding {
     }
 }
 
-fn round_trip(way: &Way) -> Finding {
-    let Some(echoes) = &way.echoes else {
+fn round_trip(network: &NetworkPath) -> Finding {
+    let Some(echoes) = &network.echoes else {
         return Finding::ok("round trip", "not measured: this user may send no echo requests (as root, `ping` does)");
     };
     if echoes.came == 0 {
@@ -141,7 +141,7 @@ mod tests {
             governor: Some("performance".into()),
             deep_idle: None,
             load: Some(0.4),
-            way: Some(Way {
+            network: Some(NetworkPath {
                 interface: Some("eth1".into()),
                 is_wireless: false,
                 held: Some(held),
@@ -151,11 +151,11 @@ mod tests {
     }
 
     /// Checks that are a cause, with what was found.
-    fn causes(change: impl FnOnce(&mut Readings, &mut Way)) -> Vec<(&'static str, String)> {
+    fn causes(change: impl FnOnce(&mut Readings, &mut NetworkPath)) -> Vec<(&'static str, String)> {
         let mut readings = good();
-        let mut way = readings.way.take().expect("a way");
-        change(&mut readings, &mut way);
-        readings.way = Some(way);
+        let mut network = readings.network.take().expect("a network");
+        change(&mut readings, &mut network);
+        readings.network = Some(network);
         let findings = judge(&readings).into_iter();
         findings.filter(|f| f.delays_commands).map(|f| (f.check, f.found)).collect()
     }
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn what_is_not_known_or_not_ideal_is_no_cause() {
-        let nothing = Way { interface: None, is_wireless: false, held: None, echoes: None };
+        let nothing = NetworkPath { interface: None, is_wireless: false, held: None, echoes: None };
         assert_eq!(causes(|r, w| (r.governor, r.load, *w) = (None, None, nothing)), []);
         assert_eq!(causes(|_, w| w.echoes = Some(echoes(0.0, 0))), [], "a robot need not answer");
         let adaptive = PacketHold { receive_us: 20, send_us: 20, is_adaptive: true };
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn without_a_robot_nothing_is_said_of_the_way_to_it() {
-        let checks: Vec<_> = judge(&Readings { way: None, ..good() }).iter().map(|f| f.check).collect();
+        let checks: Vec<_> = judge(&Readings { network: None, ..good() }).iter().map(|f| f.check).collect();
         assert_eq!(checks, ["kernel", "governor", "sleep states", "load"]);
     }
 }

@@ -87,7 +87,7 @@ pub(super) fn gripper(choice: &GripperChoice, cell: &Cell) -> Finding {
     match asked {
         Err(fault) => fault_finding("gripper", &fault),
         Ok(None) => Finding::ok("gripper", "none was named"),
-        Ok(Some((_, Some(complaint)))) => told("gripper", &format!("{choice} {complaint}")),
+        Ok(Some((_, Some(complaint)))) => reported("gripper", &format!("{choice} {complaint}")),
         Ok(Some((state, None))) => {
             Finding::ok("gripper", format!("{choice} answers; its fingers are {:.1} mm apart", 1e3 * state.width))
         }
@@ -109,11 +109,11 @@ pub(super) fn wrench(choice: &WrenchChoice, cell: &Cell) -> Finding {
 }
 
 fn fault_finding(check: &'static str, fault: &DeviceFault) -> Finding {
-    told(check, &fault.to_string())
+    reported(check, &fault.to_string())
 }
 
 /// A sentence whose remedy stands behind its first semicolon.
-fn told(check: &'static str, text: &str) -> Finding {
+fn reported(check: &'static str, text: &str) -> Finding {
     let (found, remedy) = text.split_once("; ").unwrap_or((text, "see docs/devices.md"));
     Finding::problem(check, found, remedy)
 }
@@ -145,7 +145,7 @@ mod tests {
             }
         }
         write(root, "sys/class/net/eth0/type", "1");
-        let told: Vec<_> = examine(root).iter().map(|f| (f.verdict, f.found.clone())).collect();
+        let found: Vec<_> = examine(root).iter().map(|f| (f.verdict, f.found.clone())).collect();
         let (ok, warning) = (Verdict::Ok, Verdict::Warning);
         let expected = [
             (ok, "video0"),
@@ -155,7 +155,7 @@ mod tests {
             (ok, "can1 is up"),
             (warning, "can2 is up but its bus is off"),
         ];
-        assert_eq!(told, expected.map(|(verdict, found)| (verdict, found.to_owned())));
+        assert_eq!(found, expected.map(|(verdict, found)| (verdict, found.to_owned())));
     }
 
     #[test]

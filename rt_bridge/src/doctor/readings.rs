@@ -29,12 +29,12 @@ pub(super) struct Readings {
     /// Programs that ran or waited to, over the last minute.
     pub(super) load: Option<f64>,
     /// To the robot, where one is named.
-    pub(super) way: Option<Way>,
+    pub(super) network: Option<NetworkPath>,
 }
 
-/// Of the way to the robot.
+/// Of the network between this machine and the robot.
 #[derive(Debug, Clone)]
-pub(super) struct Way {
+pub(super) struct NetworkPath {
     /// Name of the network interface.
     pub(super) interface: Option<String>,
     /// It is one.
@@ -59,16 +59,16 @@ pub(super) fn read(root: &Path, robot: Option<&str>) -> Readings {
         governor: text(&format!("{processors}/cpu{core}/cpufreq/scaling_governor")),
         deep_idle: ShallowIdle::hold().err(),
         load: text("proc/loadavg").and_then(|line| line.split(' ').next()?.parse().ok()),
-        way: robot.map(|robot| way(root, robot)),
+        network: robot.map(|robot| network(root, robot)),
     }
 }
 
-fn way(root: &Path, robot: &str) -> Way {
+fn network(root: &Path, robot: &str) -> NetworkPath {
     let address = address(robot);
     let table = fs::read_to_string(root.join("proc/net/route")).unwrap_or_default();
     let interface = address.and_then(|address| interface_to(address, &table));
     let folder = interface.as_ref().map(|name| root.join("sys/class/net").join(name).join("wireless"));
-    Way {
+    NetworkPath {
         is_wireless: folder.is_some_and(|folder| folder.exists()),
         held: interface.as_deref().and_then(|name| process::packet_hold(name).ok()),
         echoes: address.and_then(echo::round_trips),
@@ -149,7 +149,7 @@ mod tests {
         let readings = read(folder.path(), None);
         assert_eq!((readings.version.as_str(), readings.is_realtime, readings.isolated), ("6.12.8-rt", true, true));
         assert_eq!((readings.governor.as_deref(), readings.load), (Some("powersave"), Some(1.25)));
-        assert!(readings.way.is_none());
+        assert!(readings.network.is_none());
     }
 
     #[test]

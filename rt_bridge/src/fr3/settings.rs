@@ -1,4 +1,4 @@
-//! What the robot is told before a motion: how it reacts to collisions, how stiff its own controller is, what it carries.
+//! What is set on the robot before a motion: how it reacts to collisions, how stiff its own controller is, what it carries.
 //! Made from cell.toml; sent by [`super::Fr3`] before each motion, because the robot accepts it only while idle.
 
 use super::session::Session;

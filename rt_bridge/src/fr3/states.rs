@@ -11,7 +11,7 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::Duration;
 use zerocopy::FromBytes;
 
-/// Longer than any state, so that a longer datagram is told from one.
+/// Longer than any state, so that a longer datagram is recognised.
 const DATAGRAM: usize = 1500;
 
 /// What a look at the socket has found.

@@ -31,7 +31,7 @@ use std::str::FromStr;
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-/// How often a gripper is asked and told.
+/// How often a gripper is read and commanded.
 pub(crate) const PERIOD: Duration = Duration::from_millis(20);
 
 /// The Franka Hand's fingers: 0.05 m/s each, from its data sheet.

@@ -1,4 +1,4 @@
-//! Streams of targets for the fingers: one sender at a time, told to the device where it changes. After a stop none of them
+//! Streams of targets for the fingers: one sender at a time, sent to the device where it changes. After a stop none of them
 //! moves the fingers before all were silent, as with the arm.
 
 use crate::remark::Said;

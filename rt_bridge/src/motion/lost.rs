@@ -1,5 +1,5 @@
 //! What became of set points that did not come in time. An FCI robot goes on with the last acceleration instead, and refuses
-//! whoever goes on as if nothing had happened; what it is told to do by then is in its state. Pure.
+//! whoever goes on as if nothing had happened; what it is commanded to do by then is in its state. Pure.
 
 use crate::safety::Trace;
 use shared_mem::msg::Joints;
@@ -11,13 +11,14 @@ const ECHO: f64 = 2e-6;
 /// After more it has stopped by itself.
 const MOST: u64 = 20;
 
-/// How the robot is told to move now, where that is not as `sent`: `before` came before that, `in_force` is what its newest
+/// The command in force now, where that is not as `sent`: `before` came before that, `in_force` is what its newest
 /// state says, `periods` after the one that `sent` answered. `None`: it has what was sent, or nobody can tell what it has.
 pub(super) fn in_force(sent: &Trace, before: &Trace, in_force: &Joints, periods: u64, period_s: f64) -> Option<Trace> {
     if !(1..=MOST).contains(&periods) {
         return None;
     }
-    let off = |trace: &Trace| trace.q.iter().zip(in_force).map(|(q, told)| (q - told).abs()).fold(0.0, f64::max);
+    let off =
+        |trace: &Trace| trace.q.iter().zip(in_force).map(|(q, in_force)| (q - in_force).abs()).fold(0.0, f64::max);
     let taken = (1..periods).fold(*sent, |trace, _| trace.onward(period_s));
     let lost = (0..periods).fold(*before, |trace, _| trace.onward(period_s));
     let likelier = if off(&taken) <= ROUNDING { taken } else { lost };

@@ -4,7 +4,7 @@
 //! | file | owns |
 //! |---|---|
 //! | [`player`] | the queue, the verdict of [`crate::safety::Guard`] on each set point, the motion's progress |
-//! | `lost` | what the arm is told to do where set points came too late |
+//! | `lost` | the command in force where set points came too late |
 //! | `ease` | from there back to the plan |
 //! | [`brake`] | from any admitted motion to rest inside the limits |
 //! | `player/stream` | a stream of targets, followed as [`twin::arm::Follower`] plans |

@@ -113,7 +113,7 @@ impl Player {
         }
     }
 
-    /// The arm says that it is told to be at `in_force`, `periods` after the state that the last set point answered. Where
+    /// The arm reports the command `in_force`, `periods` after the state that the last set point answered. Where
     /// that is not what was sent, what follows goes on from there.
     pub fn reconcile(&mut self, in_force: &Joints, periods: u64) {
         let Some(trace) = lost::in_force(&self.trace, &self.before, in_force, periods, self.guard.period_s) else {
@@ -199,7 +199,7 @@ impl Player {
         motion != 0 && (braked || self.dropped.has(&motion))
     }
 
-    /// Brakes what is being played, or the way back to where the arm is held, of which nothing is told; nothing when it rests.
+    /// Brakes what is being played, or the way back to where the arm is held, which is not reported; nothing when it rests.
     /// One that was asked for counts at rest, too: what is being sent does not begin after it.
     pub fn stop(&mut self, why: BrakeReason) -> Option<Remark> {
         if why == BrakeReason::Asked {

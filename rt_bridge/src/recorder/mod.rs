@@ -54,7 +54,7 @@ pub struct Recorded {
     pub bytes: u64,
     /// Messages that were overwritten before they could be recorded.
     pub lost: u64,
-    /// Why recording ended before it was told to, if it did.
+    /// Why recording ended before it was asked to, if it did.
     pub stopped: Option<String>,
 }
 
@@ -116,13 +116,13 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
 
     let begin_ns = now_ns();
     let reason = keep_writing(settings, stop, (&node, &events), &mut sources, &mut writer)?;
-    if !sources.heard() && settings.parent.is_none() && matches!(reason, Reason::Told) {
+    if !sources.heard() && settings.parent.is_none() && matches!(reason, Reason::Asked) {
         drop(writer);
         std::fs::remove_file(out).map_err(|source| WriteError::Create { path: out.clone(), source })?;
         return Err(RecordError::Nothing { path: out.clone(), waited: Duration::from_nanos(now_ns() - begin_ns) });
     }
     let stopped = match reason {
-        Reason::Told => None,
+        Reason::Asked => None,
         Reason::Failed(what) => {
             events.send(&Event::new(EventLevel::Error, EventSource::Recorder, &what))?;
             Some(what)
@@ -151,7 +151,7 @@ fn loss(messages: u64) -> String {
 }
 
 enum Reason {
-    Told,
+    Asked,
     Failed(String),
 }
 
@@ -170,20 +170,20 @@ fn keep_writing(
         let silent = settings
             .patience
             .is_some_and(|patience| !sources.heard() && u128::from(now_ns() - begin_ns) >= patience.as_nanos());
-        let told = silent || stop.load(Ordering::Relaxed) || over(settings, begin_ns, &mut orphan_since);
+        let ends = silent || stop.load(Ordering::Relaxed) || over(settings, begin_ns, &mut orphan_since);
         if let Err(e) = sources.drain_into(writer)? {
             return Ok(Reason::Failed(e.to_string()));
         }
         let flushes = now_ns() - flushed_ns >= FLUSH_EVERY_NS;
-        if (told || flushes)
+        if (ends || flushes)
             && let Some(lost) = sources.newly_lost()
         {
             events.send(&Event::new(EventLevel::Warning, EventSource::Recorder, &loss(lost)))?;
         }
-        if told {
+        if ends {
             // The remark on what was lost belongs into the file as well.
             return Ok(match sources.drain_into(writer)? {
-                Ok(()) => Reason::Told,
+                Ok(()) => Reason::Asked,
                 Err(e) => Reason::Failed(e.to_string()),
             });
         }

@@ -41,7 +41,7 @@ impl Instruments {
         let wanted = [topics::WRENCH.name, topics::GRIPPER.name, topics::TWIN_STATE.name, topics::TWIN_GAP.name];
         let messages = ClipMessages::open(clip, &wanted)?;
         let stop = Arc::new(AtomicBool::new(false));
-        let told = stop.clone();
+        let stopping = stop.clone();
         let handle = starting::start("instruments", move |opened| {
             let lines = match Lines::open(wrench, gripper) {
                 Ok(lines) => lines,
@@ -49,7 +49,7 @@ impl Instruments {
                 Err(error) => return drop(opened.send(Err(InstrumentError::from(error)))),
             };
             let _waits = opened.send(Ok(()));
-            if let Err(error) = lines.show(messages, &clock, &told) {
+            if let Err(error) = lines.show(messages, &clock, &stopping) {
                 tracing::error!("the recording's force sensor and gripper stopped: {error}");
             }
         })?;

@@ -1,4 +1,4 @@
-//! The control thread: asks the machine for real time, then turns the cycle until it is told to stop.
+//! The control thread: asks the machine for real time, then turns the cycle until it is asked to stop.
 
 use super::Realtime;
 use super::cycle::{Cycle, Turn};

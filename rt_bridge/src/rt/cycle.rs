@@ -122,7 +122,7 @@ impl Cycle {
         !self.commanding || self.player.is_at_rest()
     }
 
-    /// Waits for the first state, clears a reflex that is left from before and takes command. A refusal is told, and
+    /// Waits for the first state, clears a reflex that is left from before and takes command. A refusal is reported, and
     /// leaves the loop reading.
     pub fn take_command(&mut self) -> Turn {
         if let Err(fault) = self.first_state().and_then(|()| self.start()) {
@@ -142,7 +142,7 @@ impl Cycle {
             return Ok(());
         }
         self.arm.recover()?;
-        // It stands elsewhere, maybe, and is told to be there: brakes have closed and opened.
+        // It stands elsewhere, maybe, and is commanded to be there: brakes have closed and opened.
         self.next_state()
     }
 
@@ -150,7 +150,7 @@ impl Cycle {
         loop {
             match self.arm.read(&mut self.state) {
                 Ok(Read::Fresh) => return Ok(()),
-                // A robot that came up in a reflex or under the user stop is told of once, by `start`.
+                // A robot that came up in a reflex or under the user stop is reported once, by `start`.
                 Err(fault) if !fault.is_final() => return Ok(()),
                 Err(fault) => return Err(fault),
                 Ok(Read::Missing | Read::End) => {
@@ -181,7 +181,7 @@ impl Cycle {
     fn start(&mut self) -> Result<(), ArmFault> {
         self.desired = self.arm.start(self.plan.interface)?;
         self.commanding = self.desired != Desired::Recorded;
-        // A torque law starts where the arm is, a position interface where the robot is told to be already.
+        // A torque law starts where the arm is, a position interface where the robot is commanded to be already.
         self.player.hold_at(match self.plan.interface {
             CommandInterface::Torque => self.state.q,
             CommandInterface::JointPosition => self.state.q_d,

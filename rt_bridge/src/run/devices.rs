@@ -211,7 +211,7 @@ fn inside_the_controller(hidden: &Theta) -> Option<&str> {
     gains.or_else(|| hidden::on_the_way(hidden).next())
 }
 
-/// What lets commands pass. How the arm comes after them is told by the law that computes its torques: the bridge's own, else
+/// What lets commands pass. How the arm comes after them follows from the law that computes its torques: the bridge's own, else
 /// that of cell.toml. A robot that cell.toml gives no stiffness to keeps its own, which nobody knows.
 fn guard(arm: &ArmChoice, plan: &Plan, cell: &Cell, model: &ArmModel) -> Guard {
     let controller = cell.controller.as_ref().filter(|c| *arm == ArmChoice::Sim || !c.stiffness.is_empty());

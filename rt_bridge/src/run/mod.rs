@@ -239,10 +239,10 @@ pub fn run(settings: &Settings, stop: &Arc<AtomicBool>) -> Result<RunReport> {
     let (to_pump, beats) = RingBuffer::new(BEATS);
     let (to_words, remarks) = RingBuffer::new(REMARKS);
     let (to_control, orders) = orders(CHUNKS, HELD_CHUNKS);
-    let (notices, told) = mpsc::channel();
+    let (notices, received) = mpsc::channel();
     let targets = Targets::new(devices.model, devices.plan.limits);
     let origin = ArmOrigin::new(&settings.arm.to_string());
-    let rings = Rings { beats, remarks, orders: to_control, targets, poses: devices.poses, origin, notices: told };
+    let rings = Rings { beats, remarks, orders: to_control, targets, poses: devices.poses, origin, notices: received };
     let mut pump = Pump::start(rings)?;
     let recorder = match &settings.record {
         Some(file) => {

@@ -79,7 +79,7 @@ impl Guard {
         if holds || keeps() { Ok(next) } else { Err(Violation::Workspace) }
     }
 
-    /// Whether the arm itself stays in the workspace while it is told to stop from `next` on.
+    /// Whether the arm itself stays in the workspace while it is commanded to stop from `next` on.
     fn keeps_arm(&self, next: &Trace, arm: Option<&Measured>) -> bool {
         arm.is_none_or(|arm| match &self.trailing {
             Some(trailing) => arm.keeps(next, trailing, &self.workspace, &self.limits, self.period_s),

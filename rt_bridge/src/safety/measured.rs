@@ -2,7 +2,7 @@
 //! commands while they speed up and run ahead of them while they are braked, by tens of milliradians at a hard stop: so the
 //! stop of the measured arm is looked along too, as it follows from the law, the mass matrix and where the arm is now.
 //!
-//! Where it hangs lower at rest than it is told (a load that nobody declared, friction), it is taken to do so all the way.
+//! Where it hangs lower at rest than it is commanded to (a load that nobody declared, friction), it is taken to do so all the way.
 //! Where no law is known, the gap between command and arm is taken to stay as it is now.
 
 use super::workspace::is_inside;
@@ -13,40 +13,40 @@ use twin::arm::JointState;
 /// Length of the steps in which the arm is followed on its way [s]. Between two of them the lowest point of a swing lies less
 /// than a quarter of a millimetre deeper than at them.
 const STEP: f64 = 0.01;
-/// Share of a way down that is still to come by which the arm may get lower than was told: what law and model do not say
+/// Share of a way down that is still to come by which the arm may get lower than commanded: what law and model do not say
 /// (torque that has come to its limit, periods, the steps here).
-const UNTOLD: f64 = 0.02;
+const MARGIN: f64 = 0.02;
 /// How long the arm is followed after its commands have come to rest [s]: what slow joints still creep is less than a millimetre.
 const SETTLING: f64 = 0.3;
-/// An arm that was told to rest for so long rests [s].
+/// An arm that was commanded to rest for so long rests [s].
 const RESTS: f64 = 0.5;
 
 /// What was measured of an arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     state: JointState,
-    /// Where it is told to be [rad].
-    told: Joints,
-    /// How long it has been told to rest [s].
+    /// Where it is commanded to be [rad].
+    commanded: Joints,
+    /// How long it has been commanded to rest [s].
     rested: f64,
-    /// How far it is behind what it is told where it rests, where that is lower [rad].
+    /// How far it is behind its command where it rests, where that is lower [rad].
     hangs: Joints,
     /// How far outside the workspace it was when it last rested.
     outside: Outside,
 }
 
 impl Measured {
-    /// An arm in this state, told to rest at `q_d`.
+    /// An arm in this state, commanded to rest at `q_d`.
     pub fn at_rest(state: &JointState, q_d: &Joints, workspace: &Workspace) -> Self {
         let outside = workspace.outside_measured(&state.q);
-        let mut arm = Self { state: *state, told: *q_d, rested: 0.0, hangs: [0.0; MAX_JOINTS], outside };
+        let mut arm = Self { state: *state, commanded: *q_d, rested: 0.0, hangs: [0.0; MAX_JOINTS], outside };
         arm.rest(workspace);
         arm
     }
 
-    /// Takes in a newer state of the arm, which was told `commands` last, a period of `period_s` after the one before.
+    /// Takes in a newer state of the arm, whose last command was `commands`, a period of `period_s` after the one before.
     pub fn see(&mut self, state: &JointState, commands: &Trace, workspace: &Workspace, limits: &Limits, period_s: f64) {
-        (self.state, self.told) = (*state, commands.q);
+        (self.state, self.commanded) = (*state, commands.q);
         self.rested = if commands.is_at_rest(limits.dof, period_s) { self.rested + period_s } else { 0.0 };
         if self.rested >= RESTS {
             self.rest(workspace);
@@ -55,12 +55,12 @@ impl Measured {
     }
 
     fn rest(&mut self, workspace: &Workspace) {
-        let is_lower = workspace.room(&self.state.q) < workspace.room(&self.told);
+        let is_lower = workspace.room(&self.state.q) < workspace.room(&self.commanded);
         self.hangs = if is_lower { self.gap() } else { [0.0; MAX_JOINTS] };
     }
 
     fn gap(&self) -> Joints {
-        std::array::from_fn(|i| self.told[i] - self.state.q[i])
+        std::array::from_fn(|i| self.commanded[i] - self.state.q[i])
     }
 
     /// Whether the arm stays in the workspace on its whole way to rest when it follows commands that are braked from `next` on.
@@ -77,24 +77,24 @@ impl Measured {
         }
         let way = Stopping::of(next, limits, period_s);
         let last = ((way.duration() + SETTLING) / STEP).ceil() as u32;
-        let told = |step: u32| {
+        let commanded = |step: u32| {
             let moment = way.at(f64::from(step) * STEP);
             let q = std::array::from_fn(|i| moment.q[i] - self.hangs[i]);
             (JointState { q, dq: moment.dq }, moment)
         };
-        let (mut step, (mut command, mut moment)) = (0, told(0));
+        let (mut step, (mut command, mut moment)) = (0, commanded(0));
         let mut trail = trailing.from(&self.state, &command);
         let at_first = workspace.left(&self.state.q, &self.outside);
         loop {
             let from = trail.state.q;
             let left_there = workspace.left(&from, &self.outside);
-            let left = [0, 1].map(|of| left_there[of] - UNTOLD * (at_first[of] - left_there[of]).max(0.0));
+            let left = [0, 1].map(|of| left_there[of] - MARGIN * (at_first[of] - left_there[of]).max(0.0));
             if !is_inside(left) {
                 return false;
             }
             let swing = trailing.swing(&trail, &command, &moment.change);
             let ahead =
-                std::array::from_fn(|i| (1.0 + UNTOLD) * (moment.left[i] + (command.q[i] - from[i]).abs() + swing[i]));
+                std::array::from_fn(|i| (1.0 + MARGIN) * (moment.left[i] + (command.q[i] - from[i]).abs() + swing[i]));
             if workspace.is_too_little(&ahead, left) {
                 return true;
             }
@@ -104,9 +104,9 @@ impl Measured {
                     return true;
                 }
                 step += 1;
-                (command, moment) = told(step);
+                (command, moment) = commanded(step);
                 trailing.step(&mut trail, &command, STEP);
-                let moved = std::array::from_fn(|i| (1.0 + UNTOLD) * (trail.state.q[i] - from[i]).abs());
+                let moved = std::array::from_fn(|i| (1.0 + MARGIN) * (trail.state.q[i] - from[i]).abs());
                 if !workspace.is_too_little(&moved, left) {
                     break;
                 }
@@ -197,7 +197,7 @@ mod tests {
             let arm = Measured { outside: space.outside_measured(&LOW), ..Measured::at_rest(&state, &trace.q, &space) };
             let kept = Measured { hangs: [0.0; MAX_JOINTS], ..arm }.keeps(&trace, &lab.trailing, &space, &lab.limits, T);
             if is_at_table && space.room(&LOW) >= 0.0 {
-                let untold = UNTOLD * (space.room(&state.q) - gap);
+                let untold = MARGIN * (space.room(&state.q) - gap);
                 prop_assert!(kept || gap < 1e-3 + untold, "{gap} m of room are not seen");
                 prop_assert!(!kept || gap > -1.5e-3, "{gap} m of room were not missed");
             }
@@ -213,10 +213,10 @@ mod tests {
         (trace.v[1], trace.v[3]) = (1.0, 0.3);
         let state = JointState { q: trace.q, dq: trace.v };
         let way = Stopping::of(&trace, &lab.limits, T);
-        let told = level.room(&way.at(way.duration()).q);
-        let lower = told - lab.least_room(&level, &state, &trace);
+        let commanded = level.room(&way.at(way.duration()).q);
+        let lower = commanded - lab.least_room(&level, &state, &trace);
         assert!(lower > 5e-3, "the arm comes {lower} m lower than its commands");
-        let space = lab.above(told - 0.5 * lower);
+        let space = lab.above(commanded - 0.5 * lower);
         let arm = Measured::at_rest(&state, &trace.q, &space);
         assert!(space.keeps(&trace, &lab.limits, T, &space.outside(&LOW)));
         assert!(!arm.keeps(&trace, &lab.trailing, &space, &lab.limits, T));
@@ -228,17 +228,18 @@ mod tests {
     fn an_arm_that_hangs_below_its_commands_is_taken_to_stay_there_and_may_rise() {
         let lab = lab();
         let space = lab.above(lab.above(0.0).room(&LOW) - 0.01);
-        let told = |by: f64| {
+        let commanded = |by: f64| {
             let mut q = LOW;
             q[1] += by;
             Trace::at_rest(q)
         };
         // A hundredth of a radian more of the shoulder: the tool is some 5 mm lower.
-        let state = JointState::at_rest(told(0.01).q);
+        let state = JointState::at_rest(commanded(0.01).q);
         let hangs = space.room(&LOW) - space.room(&state.q);
         assert!(hangs > 3e-3, "{hangs}");
         let lowest = |keeps: &dyn Fn(&Trace) -> bool| {
-            let deepest = (0..400).map(|k| told(f64::from(k) * 1e-4)).take_while(keeps).last().expect("it may stay");
+            let deepest =
+                (0..400).map(|k| commanded(f64::from(k) * 1e-4)).take_while(keeps).last().expect("it may stay");
             space.room(&deepest.q)
         };
         let arm = Measured::at_rest(&state, &LOW, &space);
@@ -250,10 +251,10 @@ mod tests {
         // Outside already, by what a higher table takes.
         let space = lab.above(lab.above(0.0).room(&state.q) + 0.004);
         let arm = Measured::at_rest(&state, &LOW, &space);
-        assert!(arm.keeps(&told(-0.02), &lab.trailing, &space, &lab.limits, T), "it may rise");
-        assert!(arm.keeps_its_gap(&told(-0.02), &space, &lab.limits, T), "it may rise");
-        assert!(!arm.keeps(&told(0.01), &lab.trailing, &space, &lab.limits, T), "and not sink");
-        assert!(!arm.keeps_its_gap(&told(0.01), &space, &lab.limits, T), "and not sink");
+        assert!(arm.keeps(&commanded(-0.02), &lab.trailing, &space, &lab.limits, T), "it may rise");
+        assert!(arm.keeps_its_gap(&commanded(-0.02), &space, &lab.limits, T), "it may rise");
+        assert!(!arm.keeps(&commanded(0.01), &lab.trailing, &space, &lab.limits, T), "and not sink");
+        assert!(!arm.keeps_its_gap(&commanded(0.01), &space, &lab.limits, T), "and not sink");
     }
 
     #[test]

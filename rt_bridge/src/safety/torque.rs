@@ -38,13 +38,14 @@ impl TorqueGuard {
         Self { last, sent: [last; REMEMBERED], newest: 0 }
     }
 
-    /// The robot says that `told` is in force, in single precision: of the torques sent the newest that this can be. One that
-    /// came too late never was, and a step from it would be a step of several periods to the robot.
-    pub fn resume(&mut self, told: &Joints) {
-        let is_told = |sent: &Joints| sent.iter().zip(told).all(|(sent, told)| (sent - told).abs() <= ROUNDING);
+    /// Re-anchors the rate limit at the torque that the robot reports as applied, `in_force` in single precision: the newest of
+    /// those sent that this can be. One that came too late never was in force, and a step from it would be a step of several
+    /// periods to the robot.
+    pub fn resume(&mut self, in_force: &Joints) {
+        let is_in_force = |sent: &Joints| sent.iter().zip(in_force).all(|(sent, tau)| (sent - tau).abs() <= ROUNDING);
         let from_newest = (0..REMEMBERED).map(|back| (self.newest + REMEMBERED - back) % REMEMBERED);
         // A robot that does not say what is in force is taken to have got everything.
-        if let Some(found) = from_newest.filter_map(|at| self.sent.get(at)).find(|sent| is_told(sent)) {
+        if let Some(found) = from_newest.filter_map(|at| self.sent.get(at)).find(|sent| is_in_force(sent)) {
             self.last = *found;
         }
     }

@@ -40,7 +40,7 @@ pub(super) struct Body {
 }
 
 impl Body {
-    /// The arm of a cell where `[simulation]` puts it. `theta` are parameters and effects that no client is told.
+    /// The arm of a cell where `[simulation]` puts it. `theta` are parameters and effects that are hidden from clients.
     pub(super) fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, ServeError> {
         if cell.robot.as_ref().and_then(|robot| robot.model.as_deref()) != Some("fr3") {
             return Err(ServeError::NotAnFr3);
@@ -67,7 +67,7 @@ impl Body {
         })
     }
 
-    /// The model inside the robot, with the end effector and the load it was told of.
+    /// The model inside the robot, with the end effector and the load set by the client.
     pub(super) fn model(&self) -> &ArmModel {
         self.scene.cell().plant().map_or(&self.bare, |plant| plant.nominal())
     }

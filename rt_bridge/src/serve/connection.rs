@@ -1,4 +1,4 @@
-//! What all connections have in common: bytes that arrive are taken, and it ends for a reason that is told.
+//! What all connections have in common: bytes that arrive are taken, and it ends for a stated reason.
 
 use super::framing::Inbox;
 use super::wire::ROBOT_VERSION;

@@ -1,5 +1,5 @@
 //! From a stream of TCP bytes to messages: half a message waits for its other half, several come out one by one, and a
-//! length that no message has ends the conversation, because nothing after it can be told apart. Pure.
+//! length that no message has ends the conversation, because nothing after it can be parsed. Pure.
 
 use franka::wire::HeaderLayout;
 

@@ -61,7 +61,7 @@ impl Hold {
         }
     }
 
-    /// `true` once the arm is told to stand still.
+    /// `true` once the arm is commanded to stand still.
     pub(super) fn rests(&self) -> bool {
         !self.braking
     }

@@ -1,7 +1,7 @@
 //! What the robot concludes about forces from outside: its torque sensors against what its own model expects.
 //!
 //! Glossary: `tau_J` is measured behind the gear, so that rotors are no part of the balance; the model is the robot's own,
-//! with the end effector and load it was told of. `tau_ext_hat = tau_J - (M ddq + coriolis + gravity)`, so a torque that
+//! with the end effector and load set by the client. `tau_ext_hat = tau_J - (M ddq + coriolis + gravity)`, so a torque that
 //! the arm exerts on its surroundings is positive, as in libfranka's documentation. Whatever the model does not know shows
 //! up here: a payload nobody declared as well as a push. Joints in N m, wrenches in N and N m.
 #![allow(non_snake_case)] // the field's own symbols
@@ -16,7 +16,7 @@ use twin::arm::{ArmModel, JointState, Joints};
 /// Time constant of the estimate [s]. The robot's own is not published; this one passes 10 Hz and leaves 0.05 N m of what
 /// the encoders' noise makes of an acceleration.
 const LAG: f64 = 0.016;
-/// Where the Jacobian stretches less than this, a wrench cannot be told from joint torques and is reported as none.
+/// Where the Jacobian stretches less than this, a wrench cannot be derived from joint torques and is reported as none.
 const NEAR_SINGULAR: f64 = 0.03;
 
 #[derive(Debug, Clone)]

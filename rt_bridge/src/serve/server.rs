@@ -104,7 +104,7 @@ impl Until<'_> {
 }
 
 impl Server {
-    /// A robot as `cell` describes it, with parameters and effects `theta` that no client is told, listening at `ports`.
+    /// A robot as `cell` describes it, with parameters and effects `theta` that are hidden from clients, listening at `ports`.
     ///
     /// # Errors
     /// [`ServeError`] when the cell holds no FR3 that can be simulated, or a port cannot be had.

@@ -19,7 +19,7 @@ use zerocopy::IntoBytes as _;
 
 /// Number of the request that opens a session.
 const CONNECT: u32 = 0;
-/// Longest datagram that is looked at: longer than a set point, so that a longer one is told from one.
+/// Longest datagram that is looked at: longer than a set point, so that a longer one is recognised.
 const DATAGRAM: usize = 512;
 /// A connected client.
 #[derive(Debug)]

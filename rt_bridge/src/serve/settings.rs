@@ -1,4 +1,4 @@
-//! What the client has told the robot: impedance, thresholds, load, frames. Each setter is checked as the robot does it
+//! What the client has set: impedance, thresholds, load, frames. Each setter is checked as the robot does it
 //! (status 2, invalid argument); when it may be called at all is [`super::robot`]'s business.
 #![allow(non_snake_case)] // the field's own symbols
 
@@ -13,7 +13,7 @@ const JOINT_STIFFNESS: f64 = 14_250.0;
 const CARTESIAN_STIFFNESS: [[f64; 2]; 2] = [[10.0, 3000.0], [1.0, 300.0]];
 /// How far from 1 the length of a rotation matrix's column may be.
 const UNIT: f64 = 1e-5;
-/// Heaviest load that the robot can be told of [kg]: the FR3's payload, from its data sheet.
+/// Heaviest load that can be set [kg]: the FR3's payload, from its data sheet.
 const HEAVIEST: f64 = 3.0;
 /// Largest moment of its weight about the flange's origin [N m]: what the three joints of the wrist can hold, from the data
 /// sheet.
@@ -49,7 +49,7 @@ pub(super) struct Settings {
     /// While something is commanded to accelerate.
     pub(super) accelerating: Thresholds,
     pub(super) nominal: Thresholds,
-    /// What is mounted, as the laboratory has told the robot on its web page.
+    /// What is mounted, as the laboratory has set it on the robot's web page.
     pub(super) end_effector: MassProperties,
     /// What the client says is carried beside.
     pub(super) load: MassProperties,

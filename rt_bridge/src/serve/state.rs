@@ -99,7 +99,7 @@ fn fill_end_effector(wire: &mut WireState, facts: &Facts) {
             wire.O_ddP_EE_c = six(&commanded.acceleration);
             wire.O_dP_EE_c = wire.O_dP_EE_d;
         }
-        // A client that begins a Cartesian motion begins at `O_T_EE_c`, so it is told even where nothing is commanded.
+        // A client that begins a Cartesian motion begins at `O_T_EE_c`, so it is reported even where nothing is commanded.
         None => {
             wire.O_T_EE_d = floats(&matrix(&ee.pose(&desired.q)));
             wire.O_dP_EE_d = six(&ee.twist(&JointState { q: desired.q, dq: desired.v }));

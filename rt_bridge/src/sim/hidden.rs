@@ -1,4 +1,4 @@
-//! What acts in the simulated cell that nobody outside of it is told: parameters and effects from files.
+//! What acts in the simulated cell hidden from everybody outside of it: parameters and effects from files.
 
 use anyhow::Result;
 use shared_mem::cell::Cell;

@@ -40,7 +40,7 @@ pub struct Views {
     pub poses: Consumer<Sighting>,
     /// What the force sensor at the wrist measures; `stamp_ns` is 0.
     pub wrenches: Consumer<Wrench>,
-    /// Effects on what a camera or a tracker reports, which nobody else is told.
+    /// Effects on what a camera or a tracker reports, hidden from everybody else.
     pub camera_effects: CameraEffects,
 }
 
@@ -73,7 +73,7 @@ pub struct World {
 
 impl World {
     /// Sets the cell up and starts it. `theta` are the *simulated* cell's own parameters and effects, which the twin is
-    /// never told. Returns the arm's end, and what else there is to see.
+    /// never reported. Returns the arm's end, and what else there is to see.
     ///
     /// # Errors
     /// [`WorldError`] when cell or parameters cannot be simulated, or there is no thread for it.
@@ -141,7 +141,7 @@ impl Outlets {
     }
 }
 
-/// A tracker for each body, under the effects that nobody is told.
+/// A tracker for each body, under the hidden effects.
 fn trackers(cell: &Cell, scene: &SimScene) -> Vec<(ObjectName, SimTracker)> {
     let effects = scene.cell().camera_effects();
     let tracker = |(number, name): (usize, &ObjectName)| {

@@ -21,7 +21,7 @@
 //!
 //! Nothing here but `service` reads or writes anything. Units SI; the camera frame is optical (z forward, y down).
 //!
-//! What looks the same cannot be told apart: of all poses that do, the one nearest to the last is reported, and at the
+//! What looks the same cannot be distinguished: of all poses that do, the one nearest to the last is reported, and at the
 //! beginning the one turned least from the base frame. [`Tracker::equivalent_yaws`] says which others there are.
 
 mod align;
@@ -160,7 +160,7 @@ impl Tracker {
         })
     }
 
-    /// Tells it how the camera projects and where it stands; to be told again when that changes.
+    /// Sets how the camera projects and where it stands; to be called again when that changes.
     pub fn set_view(&mut self, view: View) {
         self.table = Table::new(&view, self.table_height);
         self.view = Some(view);

@@ -71,7 +71,7 @@ pub fn serve(cell: &Cell, notices: Sender<Notice>) -> Result<Service, TrackerErr
     let followed = Followed::all(cell)?;
     let latency_ns = cell.camera.as_ref().map_or(0, |camera| (camera.latency * 1e9) as u64);
     let stop = Arc::new(AtomicBool::new(false));
-    let told = stop.clone();
+    let stopping = stop.clone();
     let body = move |opened: Sender<Result<(), TrackerError>>| {
         // iceoryx2's ports belong to the thread that makes them.
         let ports = match Ports::open() {
@@ -83,7 +83,7 @@ pub fn serve(cell: &Cell, notices: Sender<Notice>) -> Result<Service, TrackerErr
         };
         let _gone = opened.send(Ok(()));
         let mut desk = Desk { followed, latency_ns, notices };
-        if let Err(e) = desk.run(&ports, &told) {
+        if let Err(e) = desk.run(&ports, &stopping) {
             tracing::error!("the tracker stopped: {e}");
         }
     };
@@ -228,7 +228,7 @@ impl Desk {
     }
 }
 
-/// Whether the object is being followed, as far as people were told.
+/// Whether the object is being followed, as last reported.
 #[derive(Debug)]
 struct Standing {
     /// What it is called: `the object`, or of several by its name.

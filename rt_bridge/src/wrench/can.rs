@@ -60,7 +60,7 @@ impl Bus for CanPort {
         let frame = CanDataFrame::new(id, frame.bytes()).expect("eight bytes at most");
         match self.socket.write_frame(&frame) {
             Ok(()) => Ok(()),
-            // Nobody acknowledges and the queue is full: the silence will be told.
+            // Nobody acknowledges and the queue is full: the silence will be reported.
             Err(e) if e.should_retry() || e.raw_os_error() == Some(libc::ENOBUFS) => Ok(()),
             Err(e) => Err(self.gone(&e)),
         }

@@ -45,7 +45,7 @@ pub struct Poller<B> {
     due: Instant,
 }
 
-/// What the sensor has told about itself so far.
+/// What the sensor has reported about itself so far.
 #[derive(Debug, Default)]
 struct Setup {
     rows: Vec<[f32; 6]>,

@@ -11,10 +11,11 @@ use iceoryx2::port::subscriber::Subscriber as Port;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-/// How late a sleeper at most hears a ring that iceoryx2 0.10 lost. A listener that empties its socket between the sender's ring and
-/// the mark the sender makes of it sleeps on a mark that keeps all later rings from being sent; it reads the mark when it lies down anew.
+/// Worst wake-up delay after a notification that iceoryx2 0.10 lost. A listener that empties its socket between the sender's
+/// notification and the flag that the sender sets for it waits on a flag that keeps all later notifications from being sent; it
+/// reads the flag when it waits anew.
 const TURN: Duration = Duration::from_millis(5);
-/// Nobody lies down for less: a socket's timeout is in microseconds, and none of them means for ever.
+/// Shortest timeout of a socket: it is in whole microseconds, and 0 of them means for ever. A choice, well above one.
 const TICK: Duration = Duration::from_micros(100);
 
 /// Receives messages of one topic, oldest first. Those that fail their check are ignored and counted: see

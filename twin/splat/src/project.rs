@@ -64,9 +64,9 @@ pub(super) struct View<T: Real> {
     pub(super) size: [usize; 2],
 }
 
-/// What the projection comes by, which its gradient takes the same way back.
+/// Intermediate values of a projection, which its gradient needs again.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Way<T: Real> {
+pub(super) struct Forward<T: Real> {
     /// The centre in the camera's frame [m].
     pub(super) at: Vector3<T>,
     /// Where in the plane z = 1 the slope is taken, and along which axes that is the centre's own place.
@@ -102,7 +102,7 @@ impl<T: Real> View<T> {
     }
 
     /// The splat behind this camera; `None` when it is behind the camera or too faint.
-    pub(super) fn way(&self, bell: &Bell<T>) -> Option<Way<T>> {
+    pub(super) fn forward(&self, bell: &Bell<T>) -> Option<Forward<T>> {
         let at = self.rotation * bell.centre + self.translation;
         if at.z < T::of(NEAR) || bell.opacity < T::of(FAINTEST) {
             return None;
@@ -122,7 +122,7 @@ impl<T: Real> View<T> {
         let spread = seen_axes * Matrix3::from_diagonal(&bell.sigma);
         let covariance = spread * spread.transpose() + Matrix2::identity() * T::of(LOW_PASS);
         let is_own = [0, 1].map(|i| held[i] == plane[i]);
-        Some(Way { at, held, is_own, bent, divided, axes, seen_axes, spread, covariance, pixel })
+        Some(Forward { at, held, is_own, bent, divided, axes, seen_axes, spread, covariance, pixel })
     }
 
     /// From the camera to the splat, body frame: the direction of length 1, and how far.
@@ -134,7 +134,7 @@ impl<T: Real> View<T> {
 
     /// The splat in the picture; `None` when it is behind the camera, beside the picture, or too faint.
     pub(super) fn project<H: Real>(&self, bell: &Bell<T>, degree: usize, harmonics: &[[H; 3]]) -> Option<Projected<T>> {
-        let Way { at, covariance, pixel, .. } = self.way(bell)?;
+        let Forward { at, covariance, pixel, .. } = self.forward(bell)?;
         let inverse = covariance.try_inverse()?;
         // opacity exp(-d²/2) = 1/255 on an ellipse; its extent along an axis is d times that axis's sigma.
         let far = (T::of(2.0) * (bell.opacity * T::of(1.0 / FAINTEST)).ln()).max(T::zero()).sqrt();

@@ -227,9 +227,9 @@ mod tests {
             ControlLaw::new(Some(&Controller::default()), Some(&theta), &arm)
         };
         assert!(gains(0.0).is_ok());
-        for (first, told) in [(-100.0, "-100"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
-            let error = gains(first).expect_err(told).to_string();
-            assert!(error.contains(told) && error.contains("give 0 or") && !error.contains('\n'), "{error}");
+        for (first, expected) in [(-100.0, "-100"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
+            let error = gains(first).expect_err(expected).to_string();
+            assert!(error.contains(expected) && error.contains("give 0 or") && !error.contains('\n'), "{error}");
         }
     }
 }

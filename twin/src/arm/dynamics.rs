@@ -141,7 +141,7 @@ impl ArmModel {
     /// Acceleration under the same torque a little later, `turn` away from `q` and at velocities `dq`.
     ///
     /// Newton-Euler tells exactly by what torque the acceleration of before is off; what that torque accelerates is
-    /// told by the mass matrix of before, which is off by the turn. Over half a millisecond each is about a thousandth, so
+    /// given by the mass matrix of before, which is off by the turn. Over half a millisecond each is about a thousandth, so
     /// a millionth of the acceleration is what a mass matrix of its own would change.
     #[inline(always)]
     pub(super) fn respond_later<const N: usize>(

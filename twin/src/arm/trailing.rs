@@ -61,7 +61,7 @@ impl Trailing {
         drawn.then(|| Self { model: model.clone(), stiffness: *stiffness, damping: *damping, follow })
     }
 
-    /// From `state` on, told `command` (positions and velocities).
+    /// From `state` on, commanded `command` (positions and velocities).
     pub fn from(&self, state: &JointState, command: &JointState) -> Trail {
         let mass = self.mass(&state.q);
         let mut factors = mass;
@@ -80,7 +80,7 @@ impl Trailing {
         }
     }
 
-    /// `length` seconds on, at whose end the arm is told `command`.
+    /// `length` seconds on, at whose end the arm is commanded `command`.
     pub fn step(&self, trail: &mut Trail, command: &JointState, length: f64) {
         let turned: f64 = trail.state.q.iter().zip(&trail.mass_at).map(|(q, at)| (q - at).abs()).sum();
         if turned > NEARBY {

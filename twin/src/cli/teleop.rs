@@ -79,11 +79,11 @@ fn host_name(text: &str) -> Result<String, String> {
 impl Teleop {
     pub(crate) fn run(self) -> anyhow::Result<()> {
         let stop = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&stop);
-        ctrlc::set_handler(move || told.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
+        let stopping = Arc::clone(&stop);
+        ctrlc::set_handler(move || stopping.store(true, Ordering::Relaxed)).context("cannot listen for Ctrl-C")?;
         if let Some(parent) = self.parent {
-            let told = Arc::clone(&stop);
-            parent::when_gone(parent, move || told.store(true, Ordering::Relaxed))?;
+            let stopping = Arc::clone(&stop);
+            parent::when_gone(parent, move || stopping.store(true, Ordering::Relaxed))?;
         }
         let task = Arc::new(Task::read(&self.task)?);
         let recording = Recording {

@@ -8,7 +8,7 @@ use shared_mem::time::TICK_NS;
 /// A log at most this far apart is the control loop's own: a missing row was lost on its way to the log, not to the
 /// robot [ns].
 const CONTROL_RATE_NS: u64 = 1_500_000;
-/// So many usual steps without a command are a hole: what the robot was told in there cannot be guessed.
+/// So many usual steps without a command are a hole: what the robot was commanded in there cannot be guessed.
 const HOLE_STEPS: u64 = 20;
 
 /// Commands over time. The newest one is held, as a servo holds it between packets; single rows that a 1 kHz log lost

@@ -3,7 +3,7 @@
 //!
 //! | file | owns |
 //! |---|---|
-//! | `commands` | [`CommandTrack`]: what the robot was told |
+//! | `commands` | [`CommandTrack`]: what the robot was commanded |
 //! | `plant` | [`Plant`]: arm, controller and hidden effects of a cell |
 //! | `motion` | one control period of an arm |
 //! | `arm` | [`ArmRollout`] over a whole clip |

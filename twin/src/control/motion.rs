@@ -7,7 +7,7 @@ use crate::arm::{JointState, Joints, MAX_JOINTS, Yielding};
 use crate::effects::ArmMemory;
 use shared_mem::time::{TICK, TICK_NS};
 
-/// What an arm is told for one control period.
+/// The command of an arm for one control period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Drive {
     /// The controller of cell.toml runs inside the robot and follows these.

@@ -15,7 +15,7 @@ pub struct Plant {
     law: ControlLaw,
     /// The gains that its user asked for instead.
     asked: Option<ControlLaw>,
-    /// The model inside a controller that was told of a load: `nominal` with it.
+    /// The model inside a controller that knows of a load: `nominal` with it.
     laden: Option<ArmModel>,
     /// Effects and the arm that they make; `None` for an arm that is as cell.toml says.
     hidden: Option<(ArmEffects, ArmModel)>,

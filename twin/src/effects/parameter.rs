@@ -42,15 +42,15 @@ pub enum Search {
     Threshold,
     /// A limit: as long as it is not reached nothing happens, and no slope leads there.
     Limit,
-    /// As the teeth of a gear: a little out of step it does nothing.
-    InStep,
+    /// Of a periodic law, like the teeth of a gear: a little out of phase over the travel it explains nothing.
+    Periodic,
     /// The angle of a size, which together are a vector: at `quarter` it acts across [rad].
     Angle {
         /// A quarter of the angle's period.
         quarter: f64,
     },
-    /// It changes a hit, of which slopes at one point tell little.
-    Uneven,
+    /// It changes a hit: the likelihood is not smooth in it, and its slope at one point says little.
+    NonSmooth,
     /// A place in the base frame that a search does not move: its default, or the middle of where the objects were. A camera is
     /// calibrated for the place where it is used, so an error of its direction or scale is least there.
     Middle,

@@ -25,7 +25,7 @@ struct Pushed<'a> {
 }
 
 impl<F: SlidingFriction> Tumbling<F> {
-    /// The presses' forces on a body that goes on standing [N]; `None` when such a one could not give way to them.
+    /// Contact forces of the tool on an upright body that slides on its base [N]; `None` where none are feasible.
     pub(super) fn push(
         &self,
         (footing, state): (&Footing, &PlanarState),

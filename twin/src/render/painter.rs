@@ -50,7 +50,7 @@ pub enum PaintError {
 /// Models that are drawn again and again, through one lens, wherever their poses put them.
 #[derive(Debug)]
 pub struct Painter {
-    way: Way,
+    backend: Backend,
     /// Who draws, for people.
     name: String,
     /// Why it is not the one that comes first.
@@ -58,7 +58,7 @@ pub struct Painter {
 }
 
 #[derive(Debug)]
-enum Way {
+enum Backend {
     Processor {
         canvas: Canvas,
         models: Vec<(Model, u32)>,
@@ -80,8 +80,8 @@ impl Painter {
             (Drawer::Auto, Err(error)) => note = Some(error.to_string()),
             _ => {}
         }
-        let way = Way::Processor { canvas: Canvas::new(lens, size), models };
-        Ok(Self { way, name: "the processor".into(), note })
+        let backend = Backend::Processor { canvas: Canvas::new(lens, size), models };
+        Ok(Self { backend, name: "the processor".into(), note })
     }
 
     #[cfg(feature = "render")]
@@ -101,7 +101,7 @@ impl Painter {
         }
         let shapes: Vec<(Shape<'_>, u32)> = models.iter().map(|(model, number)| (model.shape(), *number)).collect();
         let canvas = DeviceCanvas::new(&device, &shapes, lens, size)?;
-        Ok(Some(Self { way: Way::Device(Box::new(canvas)), name: device.name().to_owned(), note: None }))
+        Ok(Some(Self { backend: Backend::Device(Box::new(canvas)), name: device.name().to_owned(), note: None }))
     }
 
     #[cfg(not(feature = "render"))]
@@ -118,8 +118,8 @@ impl Painter {
         camera_from_body: &[Option<Isometry3<f64>>],
         around: &Surroundings,
     ) -> Result<Picture, PaintError> {
-        match &mut self.way {
-            Way::Processor { canvas, models } => {
+        match &mut self.backend {
+            Backend::Processor { canvas, models } => {
                 let bodies: Vec<Body<'_>> = (models.iter().zip(camera_from_body))
                     .filter_map(|((model, instance), pose)| {
                         Some(Body { shape: model.shape(), camera_from_body: (*pose)?, instance: *instance })
@@ -128,7 +128,7 @@ impl Painter {
                 Ok(canvas.render(&bodies, around))
             }
             #[cfg(feature = "render")]
-            Way::Device(canvas) => Ok(canvas.render(camera_from_body, around)?),
+            Backend::Device(canvas) => Ok(canvas.render(camera_from_body, around)?),
         }
     }
 

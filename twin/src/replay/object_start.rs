@@ -162,8 +162,8 @@ mod tests {
         let (object, cell) = box_on_table();
         let sunk = series((0..20).map(|_| Isometry3::translation(0.5, 0.0, 0.13)));
         for kind in [ClipKind::ControlHitSlide, ClipKind::FreeMotion] {
-            let told = remark(&sunk, kind, &object, &cell).expect("not buried").expect("a remark");
-            assert!(told.contains("20 mm into the table"), "{told}");
+            let said = remark(&sunk, kind, &object, &cell).expect("not buried").expect("a remark");
+            assert!(said.contains("20 mm into the table"), "{said}");
         }
         let starts = [resting(&sunk, &object, &cell), moving(&sunk, &object, &cell).map(|state| state.pose)];
         for start in starts.map(|start| start.expect("poses")) {

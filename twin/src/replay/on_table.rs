@@ -1,6 +1,6 @@
 //! Whether the recorded poses put the object where the table carries it. Poses in another frame, or a table at another
 //! height than cell.toml says, put it inside or above; where that can be mended the object is set onto the table and
-//! whoever reads the figures is told. Base frame, SI. Called by [`super::object_start`].
+//! a remark says so. Base frame, SI. Called by [`super::object_start`].
 
 use crate::scene::ObjectShape;
 use nalgebra::Isometry3;
@@ -42,7 +42,7 @@ impl Depth {
         self.lowest > OFF
     }
 
-    /// What to tell about an object that should stand on the table and was set onto it.
+    /// The remark about an object that should stand on the table and was set onto it.
     ///
     /// # Errors
     /// [`Buried`] when it cannot be meant to stand there.
@@ -57,8 +57,8 @@ impl Depth {
         if self.middle > OFF {
             return Err(Buried(*self));
         }
-        let told = if self.is_inside() { Some("into") } else { (self.lowest < -OFF).then_some("above") };
-        Ok(told.map(sentence))
+        let remark = if self.is_inside() { Some("into") } else { (self.lowest < -OFF).then_some("above") };
+        Ok(remark.map(sentence))
     }
 }
 
@@ -67,28 +67,28 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    fn told(height: f64) -> Result<Option<String>, Buried> {
+    fn remark(height: f64) -> Result<Option<String>, Buried> {
         let shape = ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) };
         Depth::of(&shape, &Isometry3::translation(0.5, 0.0, height), &Table { height: 0.2 }).set_onto()
     }
 
     #[test]
     fn noise_is_not_worth_a_word() {
-        assert_eq!(told(0.248), Ok(None));
-        assert_eq!(told(0.252), Ok(None));
+        assert_eq!(remark(0.248), Ok(None));
+        assert_eq!(remark(0.252), Ok(None));
     }
 
     #[test]
     fn an_object_off_the_table_is_set_onto_it_with_a_word() {
         for (height, words) in [(0.23, "20 mm into the table"), (0.31, "60 mm above the table")] {
-            let told = told(height).expect("on the table").expect("a word");
-            assert!(told.contains(words) && told.contains("set onto it") && told.contains("table.height"), "{told}");
+            let said = remark(height).expect("on the table").expect("a word");
+            assert!(said.contains(words) && said.contains("set onto it") && said.contains("table.height"), "{said}");
         }
     }
 
     #[test]
     fn an_object_below_the_table_is_refused_in_one_line() {
-        let error = told(0.1).expect_err("buried").to_string();
+        let error = remark(0.1).expect_err("buried").to_string();
         assert!(
             error.contains("100 mm below the table") && error.contains("check") && !error.contains('\n'),
             "{error}"

@@ -60,7 +60,7 @@ pub enum ReplayError {
     /// Too little was recorded.
     #[error("{0}: too short to replay: it holds {1}; record it again or remove it from cell.toml")]
     TooShort(String, &'static str),
-    /// Nobody logged what the arm was told.
+    /// Nobody logged what the arm was commanded.
     #[error(
         "{0}: it holds no commands, without which the twin's arm cannot be led: what can be explained are its torques, where it has any, by `calibration diagnose --torques`"
     )]

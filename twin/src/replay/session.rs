@@ -1,4 +1,4 @@
-//! All clips of a session, on all cores. A clip that cannot be used is told and left out; the others are replayed.
+//! All clips of a session, on all cores. A clip that cannot be used is named and left out; the others are replayed.
 
 use super::predict::{ReplayError, Replayer};
 use super::report::{ClipGap, Failure, SessionGap};

@@ -4,7 +4,7 @@ use crate::control::{CommandTrack, Reading};
 use nalgebra::Vector3;
 use shared_mem::frames::{Base, Object, Pose};
 
-/// What a cell is told over a clip, and when its answers are wanted.
+/// The commands of a clip, and when the answers to them are wanted.
 #[derive(Debug, Clone, Copy)]
 pub struct Course<'a> {
     /// Commands to the arm; `None` where there is no arm, or where it shall stay as it is.

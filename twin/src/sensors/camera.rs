@@ -88,7 +88,7 @@ impl SimCamera {
         Self { flange_from_camera: Some(flange_from_camera), ..self }
     }
 
-    /// The same camera under effects that nobody is told: it stands elsewhere than [`Self::info`] says, and its pictures
+    /// The same camera under hidden effects: it stands elsewhere than [`Self::info`] says, and its pictures
     /// are older than their stamps. What is a tracker's own ([`CameraEffects::of_the_tracker`]) is in no picture.
     pub fn with_effects(self, effects: &CameraEffects) -> Self {
         let misplaced = effects.misplaced().cast::<f32>();

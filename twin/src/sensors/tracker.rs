@@ -57,7 +57,7 @@ impl SimTracker {
         }
     }
 
-    /// The same tracker under effects that nobody is told: its poses are then older than their stamps say, or elsewhere.
+    /// The same tracker under hidden effects: its poses are then older than their stamps say, or elsewhere.
     pub fn with_effects(self, effects: CameraEffects) -> Self {
         Self { effects, ..self }
     }
@@ -137,10 +137,10 @@ mod tests {
     #[test]
     fn a_pose_comes_at_the_cameras_rate_and_one_latency_late() {
         let mut tracker = SimTracker::new(&cell(0.030));
-        let told: Vec<(u64, ObjectPose)> =
+        let reported: Vec<(u64, ObjectPose)> =
             (0..200).filter_map(|t| tracker.observe(&scene(t)).map(|pose| (t, pose))).collect();
-        assert_eq!(told.iter().map(|(t, _)| *t).collect::<Vec<_>>(), [30, 50, 70, 90, 110, 130, 150, 170, 190]);
-        for (i, (t, pose)) in told.iter().enumerate() {
+        assert_eq!(reported.iter().map(|(t, _)| *t).collect::<Vec<_>>(), [30, 50, 70, 90, 110, 130, 150, 170, 190]);
+        for (i, (t, pose)) in reported.iter().enumerate() {
             assert_eq!(pose.sequence, i as u64);
             assert_eq!(pose.device_ns, camera_clock_ns((t - 30) * 1_000_000));
             let late = *t as f64 * 1e-3 - pose.position[0];
@@ -157,10 +157,10 @@ mod tests {
         let mut exact = cell(0.030);
         exact.objects[0].pose_noise = None;
         let mut tracker = SimTracker::new(&exact).with_effects(effects);
-        let told: Vec<(u64, ObjectPose)> =
+        let reported: Vec<(u64, ObjectPose)> =
             (0..200).filter_map(|t| tracker.observe(&scene(t)).map(|pose| (t, pose))).collect();
-        assert_eq!(told[0].0, 70, "30 ms that are known and 40 ms that are not");
-        for (t, pose) in told {
+        assert_eq!(reported[0].0, 70, "30 ms that are known and 40 ms that are not");
+        for (t, pose) in reported {
             let stamped = (t - 30) as f64 * 1e-3;
             assert_eq!(pose.device_ns, camera_clock_ns((t - 30) * 1_000_000));
             assert!((stamped - pose.position[0] - 0.04).abs() < 1e-12, "{} at {stamped} s", pose.position[0]);

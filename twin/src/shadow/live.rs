@@ -1,5 +1,5 @@
 //! The shadow on shared memory: sleeps until the bridge sends a state, mirrors it, sends prediction and gap on. The
-//! bridge may come later, go away and come back; what happens is told to a [`Watcher`].
+//! bridge may come later, go away and come back; what happens is reported to a [`Watcher`].
 
 use super::{MirrorError, Mirrored, ObjectEvent, Shadow};
 use shared_mem::msg::arm::ArmState;

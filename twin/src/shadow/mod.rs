@@ -1,4 +1,4 @@
-//! The live twin: a simulated cell that is told what the real arm is told and compared with what the real cell does.
+//! The live twin: a simulated cell that gets the commands of the real arm and is compared with what the real cell does.
 //!
 //! [`Shadow`] is the whole logic without processes: feed it arm states and poses of objects, take predictions and gaps out.
 //! [`live`] wires it to shared memory. One thread; stamps are the host's monotonic clock unless a name says otherwise.
@@ -71,7 +71,7 @@ pub enum Event {
     Hole(u64),
     /// The robot's clock went backwards.
     ClockWentBack,
-    /// The twin was told to skip what it had not mirrored yet.
+    /// The twin was asked to skip what it had not mirrored yet.
     FellBehind,
 }
 

@@ -163,7 +163,7 @@ impl SimArm {
         self.sense(share);
     }
 
-    /// Adds what the sensors behind the gears told in this `share` of the period.
+    /// Adds what the sensors behind the gears measured in this `share` of the period.
     fn sense(&mut self, share: f64) {
         self.plant.rollout().sense(&mut self.motion, &self.before);
         for (sum, torque) in self.sensed.iter_mut().zip(&self.motion.tau_J) {
@@ -239,7 +239,7 @@ impl SimArm {
         self.plant.arm()
     }
 
-    /// The command in force, which an arm keeps that is told nothing new.
+    /// The command in force, which an arm keeps until a new one.
     pub(super) fn command(&self) -> Drive {
         Drive::JointImpedance { q_d: self.q_d, dq_d: self.dq_d }
     }

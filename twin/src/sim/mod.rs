@@ -232,7 +232,7 @@ impl SimCell {
         self.reading().tau_J
     }
 
-    /// The command in force: what an arm goes on with that is told nothing new. No torque without an arm.
+    /// The command in force: what an arm goes on with without a new one. No torque without an arm.
     pub fn command(&self) -> Drive {
         self.arm.as_ref().map_or(Drive::Torque { tau_J_d: [0.0; 8] }, SimArm::command)
     }

@@ -132,7 +132,7 @@ impl<F: SlidingFriction, const N: usize> Step<'_, F, N> {
     }
 
     /// One explicit step of at most `left`: the time taken, `None` when it would have to be shorter than `shortest` or
-    /// the loads cannot be told from the directions of slip alone. The implicit step decides then.
+    /// the loads cannot be derived from the directions of slip alone. The implicit step decides then.
     fn explicit(&self, state: &mut PlanarState, left: f64, shortest: f64) -> Option<f64> {
         if state.is_at_rest() {
             return None;
@@ -166,7 +166,7 @@ impl<F: SlidingFriction, const N: usize> Step<'_, F, N> {
             let turned = turn(cos, sin, *point);
             let slip = state.velocity + left_of(turned) * state.yaw_rate;
             let (mu, speed, reach) = (self.friction.mu(state.position + turned, slip), slip.norm(), point.norm());
-            kappas[i] = turn(cos, -sin, self.rubbing(state.position + turned, slip) / speed);
+            kappas[i] = turn(cos, -sin, self.friction_at(state.position + turned, slip) / speed);
             let (force, moment) = (planar.xy().norm() + mu * weight, planar.z.abs() + mu * weight * reach);
             let change =
                 force / self.slider.mass + moment * reach / self.slider.yaw_inertia + reach * state.yaw_rate.powi(2);
@@ -186,7 +186,7 @@ impl<F: SlidingFriction, const N: usize> Step<'_, F, N> {
             let speed = slip.norm();
             slips[i] = turn(cos, -sin, slip);
             if speed > 0.0 {
-                kappas[i] = turn(cos, -sin, self.rubbing(state.position + turned, slip) / speed);
+                kappas[i] = turn(cos, -sin, self.friction_at(state.position + turned, slip) / speed);
             }
         }
         let loads = load::solve(&self.places, self.slider.height, &local, &kappas)?;
@@ -202,7 +202,7 @@ impl<F: SlidingFriction, const N: usize> Step<'_, F, N> {
 
     /// Friction at a place, reversed, over its load and times the speed of its slip; world axes.
     #[inline]
-    fn rubbing(&self, place: Vector2<f64>, slip: Vector2<f64>) -> Vector2<f64> {
+    fn friction_at(&self, place: Vector2<f64>, slip: Vector2<f64>) -> Vector2<f64> {
         slip * self.friction.mu(place, slip) + left_of(slip) * self.friction.aside(place, slip)
     }
 

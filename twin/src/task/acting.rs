@@ -2,7 +2,7 @@
 //! success, the horizon, or something that would stop a robot.
 
 use super::Task;
-use super::arm::Way;
+use super::arm::CarrierCommand;
 use super::cell::Servo;
 use super::demonstration::Columns;
 use super::episode::{Course, STEPS_A_ROW};
@@ -69,7 +69,7 @@ pub struct Acting {
 #[derive(Debug)]
 struct Steering {
     follower: Follower,
-    way: Way,
+    command: CarrierCommand,
     target: Joints,
     servo: Option<Servo>,
 }
@@ -85,7 +85,12 @@ impl Acting {
             let q = carrier.joints_at(&world.pose(carrier.body)).ok_or(SteerError::OutOfReach)?;
             let mut follower = Follower::calm(&q, carrier.limits(), STEP);
             follower.set_speed(1.0);
-            Ok::<_, SteerError>(Steering { follower, way: Way::at_rest(q), target: q, servo: Servo::begin(task, &q) })
+            Ok::<_, SteerError>(Steering {
+                follower,
+                command: CarrierCommand::at_rest(q),
+                target: q,
+                servo: Servo::begin(task, &q),
+            })
         });
         let arm = arm.transpose()?;
         let carried = task.carrier.as_ref().map_or_else(Vec::new, |carrier| task.carried(carrier.body));
@@ -167,7 +172,7 @@ impl Acting {
                     return;
                 };
                 let dq_d = arm.follower.velocity();
-                arm.way.go(q_d, dq_d);
+                arm.command.go(q_d, dq_d);
                 let q = arm.servo.as_mut().map_or(q_d, |servo| servo.step(&q_d, &dq_d));
                 self.world.move_to(carrier.body, &carrier.body_at(&q));
                 self.commanded[carrier.body] = carrier.body_at(&q_d);
@@ -183,16 +188,16 @@ impl Acting {
             && let Some(servo) = &arm.servo
         {
             let reading: JointState = servo.reading();
-            arm.way.read(reading);
+            arm.command.read(reading);
         }
         self.remember();
     }
 
     fn remember(&mut self) {
-        let resting = Way::default();
-        let way = self.arm.as_ref().map_or(&resting, |arm| &arm.way);
+        let resting = CarrierCommand::default();
+        let command = self.arm.as_ref().map_or(&resting, |arm| &arm.command);
         let commanded = |body: usize| self.commanded[body];
-        let moment = self.columns.moment(&self.task, &self.world, self.course.done, way, commanded);
+        let moment = self.columns.moment(&self.task, &self.world, self.course.done, command, commanded);
         self.moments.push(moment);
     }
 
@@ -310,9 +315,9 @@ mod tests {
             };
             [way(&last.poses[hand]), way(&last.targets[0])]
         };
-        let ([told, wanted], [moved, same], [delayed, _]) = (at(&exact), at(&nominal), at(&late));
-        assert!((told - wanted).abs() < 1e-9 && (same - wanted).abs() < 1e-9);
-        assert!(delayed < moved && moved < told, "{delayed} {moved} {told}");
+        let ([reached, wanted], [moved, same], [delayed, _]) = (at(&exact), at(&nominal), at(&late));
+        assert!((reached - wanted).abs() < 1e-9 && (same - wanted).abs() < 1e-9);
+        assert!(delayed < moved && moved < reached, "{delayed} {moved} {reached}");
         let mut seen = Acting::begin(&Arc::new(late), 1).expect("a start");
         let hand = [0.35, 0.0, 0.30];
         let turn = nalgebra::one();

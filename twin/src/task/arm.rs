@@ -24,9 +24,9 @@ pub(super) struct Carrier {
     gains: Option<[Joints; 2]>,
 }
 
-/// The arm on its way.
+/// What the arm of a carrier is commanded, and what it cannot do of that.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Way {
+pub(super) struct CarrierCommand {
     q: Option<Joints>,
     dq: Joints,
     /// What the encoders read, where the arm is not where it is commanded to be.
@@ -35,7 +35,7 @@ pub(super) struct Way {
     pub(super) fault: Option<String>,
 }
 
-impl Way {
+impl CarrierCommand {
     pub(super) fn at_rest(q: Joints) -> Self {
         Self { q: Some(q), ..Self::default() }
     }
@@ -127,13 +127,18 @@ impl Carrier {
     }
 
     /// Goes on to where the body is at a time [s]; `next` is where it is `step` seconds later.
-    pub(super) fn follow(&self, way: &mut Way, [now, next]: [&Isometry3<f64>; 2], (time, step): (f64, f64)) {
+    pub(super) fn follow(
+        &self,
+        command: &mut CarrierCommand,
+        [now, next]: [&Isometry3<f64>; 2],
+        (time, step): (f64, f64),
+    ) {
         let target = self.base_from_world * now;
-        let from = way.q.unwrap_or(*self.model.ready());
+        let from = command.q.unwrap_or(*self.model.ready());
         let Some(q) = self.model.reach(&from, &self.flange_from_body, &target) else {
             let [x, y, z] = target.translation.vector.into();
             let at = format!("({x:.3}, {y:.3}, {z:.3}) m");
-            way.fault.get_or_insert_with(|| format!("it does not reach {at} at {time:.2} s"));
+            command.fault.get_or_insert_with(|| format!("it does not reach {at} at {time:.2} s"));
             return;
         };
         let shift = (next.translation.vector - now.translation.vector) / step;
@@ -146,23 +151,23 @@ impl Carrier {
             if !(limits.q_min..=limits.q_max).contains(&at) {
                 let (low, high) = (limits.q_min, limits.q_max);
                 let what = || format!("{name} is at {at:.3} rad at {time:.2} s, beyond {low:.3} to {high:.3}");
-                way.fault.get_or_insert_with(what);
+                command.fault.get_or_insert_with(what);
             } else if !(slowest..=fastest).contains(&speed) {
                 let what = || {
                     format!(
                         "{name} turns at {speed:.2} rad/s at {time:.2} s, beyond {slowest:.2} to {fastest:.2} there"
                     )
                 };
-                way.fault.get_or_insert_with(what);
+                command.fault.get_or_insert_with(what);
             }
         }
-        (way.q, way.dq) = (Some(q), dq);
+        (command.q, command.dq) = (Some(q), dq);
     }
 
     /// As a robot reports itself; its stamps do not count. `None` before it has reached anything.
-    pub(super) fn state(&self, way: &Way, world: &World) -> Option<ArmState> {
-        let (q_d, dq_d) = (way.q?, way.dq);
-        let reading = way.reading.or_else(|| world.arm(self.body));
+    pub(super) fn state(&self, command: &CarrierCommand, world: &World) -> Option<ArmState> {
+        let (q_d, dq_d) = (command.q?, command.dq);
+        let reading = command.reading.or_else(|| world.arm(self.body));
         let JointState { q, dq } = reading.unwrap_or(JointState { q: q_d, dq: dq_d });
         Some(ArmState {
             dof: self.model.dof() as u32,

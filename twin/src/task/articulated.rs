@@ -167,7 +167,7 @@ mod tests {
             assert!(LAPTOP.contains(what), "{what}");
             LAPTOP.replace(what, instead)
         };
-        for (urdf, block, told) in [
+        for (urdf, block, expected) in [
             (without("type='revolute'", "type='continuous'"), fine, "joint `hinge` has no limits"),
             (without(" upper='1.5708'", " upper='-0.5'"), fine, "joint `hinge` has no limits"),
             (without("<box size='0.006 0.31 0.21'/>", "<sphere radius='1'/>"), fine, "is no box, cylinder or mesh"),
@@ -181,8 +181,8 @@ mod tests {
             (LAPTOP.to_owned(), "friction = 0.5\njoints = { hinge = 2.0 }\n", "outside of its limits"),
             (LAPTOP.to_owned(), "friction = 0.5\nhold = \"moved\"\n", "it is \"free\" or \"fixed\""),
         ] {
-            let error = with(&urdf, block).err().unwrap_or_else(|| panic!("{told}"));
-            assert!(error.contains(told) && !error.contains('\n'), "{error}");
+            let error = with(&urdf, block).err().unwrap_or_else(|| panic!("{expected}"));
+            assert!(error.contains(expected) && !error.contains('\n'), "{error}");
         }
     }
 }

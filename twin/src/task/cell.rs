@@ -122,13 +122,13 @@ impl Task {
     }
 }
 
-/// The arm between what it is told and where it is.
+/// The arm between its command and where it is.
 pub(super) struct Servo {
     arm: SimCell,
 }
 
 impl Servo {
-    /// At rest at joints that it was told to be at for long; `None` where the arm is where it is commanded to be.
+    /// At rest at joints that it has been commanded to for long; `None` where the arm is where it is commanded to be.
     pub(super) fn begin(task: &Task, q: &Joints) -> Option<Self> {
         let mut arm = task.cell.as_ref()?.arm.clone()?;
         let dof = arm.arm_model().map_or(0, |model| model.dof());

@@ -1,6 +1,6 @@
 //! A run as the rows of a clip: where everything was and what was commanded, at a fixed rate.
 
-use super::arm::Way;
+use super::arm::CarrierCommand;
 use super::episode::{Episode, Run};
 use super::start::StartError;
 use super::{BodyPlan, Task};
@@ -39,7 +39,7 @@ impl Columns {
         task: &Task,
         world: &World,
         done: usize,
-        way: &Way,
+        command: &CarrierCommand,
         commanded: impl Fn(usize) -> Isometry3<f64>,
     ) -> EpisodeMoment {
         EpisodeMoment {
@@ -49,7 +49,7 @@ impl Columns {
             joints: self.joints.iter().filter_map(|body| world.joint(*body)).collect(),
             drives: self.driven.iter().filter_map(|body| world.driven_to(*body)).collect(),
             gripper: task.gripper.as_ref().and_then(|gripper| gripper.state(world, task.bodies.len())),
-            arm: task.carrier.as_ref().and_then(|carrier| carrier.state(way, world)).map(Box::new),
+            arm: task.carrier.as_ref().and_then(|carrier| carrier.state(command, world)).map(Box::new),
         }
     }
 
@@ -77,7 +77,7 @@ impl Task {
         let columns = Columns::of(self);
         let mut moments = Vec::new();
         let episode = self.watched(how, |done, scene| {
-            moments.push(columns.moment(self, scene.world, done, scene.way, |body| scene.commanded(body, done)));
+            moments.push(columns.moment(self, scene.world, done, scene.command, |body| scene.commanded(body, done)));
         })?;
         let info = EpisodeInfo {
             task: self.name.clone(),

@@ -1,7 +1,7 @@
 //! One run of a task: did it come to rest, where, and was it a success.
 
 use super::Task;
-use super::arm::Way;
+use super::arm::CarrierCommand;
 use super::cell::Servo;
 use super::motion::Motions;
 use super::progress::Progress;
@@ -38,7 +38,7 @@ pub(super) struct Scene<'a> {
     /// Poses of all bodies at the beginning.
     pub(super) starts: &'a [Isometry3<f64>],
     /// The arm, where the task has one.
-    pub(super) way: &'a Way,
+    pub(super) command: &'a CarrierCommand,
 }
 
 impl Scene<'_> {
@@ -135,25 +135,25 @@ impl Task {
         let start_q = joints(&world);
         let steps = (how.duration / STEP).round().max(1.0) as usize;
         let mut run = Course::new();
-        let mut way = Way::default();
-        self.carry(&mut way, (&motions, &poses), 0);
+        let mut command = CarrierCommand::default();
+        self.carry(&mut command, (&motions, &poses), 0);
         let mut progress = Progress::begin(self, &world);
-        let mut servo = way.joints().and_then(|q| Servo::begin(self, q));
-        watch(0, &Scene { world: &world, motions: &motions, starts: &poses, way: &way });
+        let mut servo = command.joints().and_then(|q| Servo::begin(self, q));
+        watch(0, &Scene { world: &world, motions: &motions, starts: &poses, command: &command });
         while run.done < steps && !run.is_success(self.hold) {
             motions.act(&mut world, &poses, run.done);
             if let Some(servo) = &mut servo {
-                self.obey(servo, &way, &mut world, run.done);
+                self.obey(servo, &command, &mut world, run.done);
             }
             world.step();
             run.count(self, &world);
             if run.done.is_multiple_of(STEPS_A_ROW) {
                 progress.look(self, &world);
-                self.carry(&mut way, (&motions, &poses), run.done);
+                self.carry(&mut command, (&motions, &poses), run.done);
                 if let Some(servo) = &servo {
-                    way.read(servo.reading());
+                    command.read(servo.reading());
                 }
-                watch(run.done, &Scene { world: &world, motions: &motions, starts: &poses, way: &way });
+                watch(run.done, &Scene { world: &world, motions: &motions, starts: &poses, command: &command });
             }
         }
         let at_rest = (run.done - run.moved) as f64 * STEP > STILL_FOR;
@@ -163,7 +163,7 @@ impl Task {
             end: Place::of(&world, body),
             speed_m_s: world.speed(body),
         });
-        let success = run.is_success(self.hold) && way.fault.is_none();
+        let success = run.is_success(self.hold) && command.fault.is_none();
         Ok(Episode {
             seed: how.seed,
             duration_s: run.done as f64 * STEP,
@@ -172,7 +172,7 @@ impl Task {
             success,
             progress: progress.best(success),
             missed: if success { Vec::new() } else { self.missed(&world) },
-            arm_fault: way.fault,
+            arm_fault: command.fault,
             arm: start_q.zip(joints(&world)).map(|(start_q, end_q)| ArmEnd { start_q, end_q }),
             bodies: bodies.collect(),
             contacts: self.contacts(&world),
@@ -180,19 +180,19 @@ impl Task {
     }
 
     /// Lets the arm go on to where its body is commanded to be after so many steps.
-    fn carry(&self, way: &mut Way, (motions, starts): (&Motions, &[Isometry3<f64>]), done: usize) {
+    fn carry(&self, command: &mut CarrierCommand, (motions, starts): (&Motions, &[Isometry3<f64>]), done: usize) {
         if let Some(carrier) = &self.carrier {
             let [now, next] = [done, done + 1].map(|done| commanded(motions, starts, carrier.body, done));
-            carrier.follow(way, [&now, &next], (done as f64 * STEP, STEP));
+            carrier.follow(command, [&now, &next], (done as f64 * STEP, STEP));
         }
     }
 
     /// Has the arm follow its way for a step, from the last row of it on, and what it carries with it.
-    fn obey(&self, servo: &mut Servo, way: &Way, world: &mut World, done: usize) {
-        let (Some(carrier), Some(q)) = (&self.carrier, way.joints()) else { return };
+    fn obey(&self, servo: &mut Servo, command: &CarrierCommand, world: &mut World, done: usize) {
+        let (Some(carrier), Some(q)) = (&self.carrier, command.joints()) else { return };
         let since = ((done % STEPS_A_ROW) + 1) as f64 * STEP;
-        let q_d = std::array::from_fn(|i| q[i] + since * way.speeds()[i]);
-        world.move_to(carrier.body, &carrier.body_at(&servo.step(&q_d, way.speeds())));
+        let q_d = std::array::from_fn(|i| q[i] + since * command.speeds()[i]);
+        world.move_to(carrier.body, &carrier.body_at(&servo.step(&q_d, command.speeds())));
     }
 
     fn contacts(&self, world: &World) -> Vec<[String; 2]> {

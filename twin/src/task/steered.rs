@@ -2,7 +2,7 @@
 //! carries goes with the flange. What is recorded of it is what is recorded of a scripted one.
 
 use super::Task;
-use super::arm::{Carrier, Way};
+use super::arm::{Carrier, CarrierCommand};
 use super::demonstration::Columns;
 use super::episode::{Course, STEPS_A_ROW};
 use super::start::{Placed, StartError};
@@ -61,7 +61,7 @@ pub struct Steered {
     world: World,
     follower: Follower,
     jog: Jog,
-    way: Way,
+    command: CarrierCommand,
     /// Where the joints are going, and the flange with them.
     target: Joints,
     flange: Isometry3<f64>,
@@ -96,7 +96,7 @@ impl Steered {
             world,
             follower,
             jog: Jog::Still,
-            way: Way::at_rest(q),
+            command: CarrierCommand::at_rest(q),
             target: q,
             flange: carrier.flange(&q),
             clear: q,
@@ -132,10 +132,10 @@ impl Steered {
             self.aim(carrier);
         }
         match self.follower.step() {
-            Some(q) => self.way.go(q, self.follower.velocity()),
+            Some(q) => self.command.go(q, self.follower.velocity()),
             None => self.held_by = Some("no way to where it is jogged"),
         }
-        if let Some(q) = self.way.joints() {
+        if let Some(q) = self.command.joints() {
             match self.world.arm(carrier.body) {
                 Some(_) => self.world.aim(carrier.body, q, &self.follower.velocity()),
                 None => self.world.move_to(carrier.body, &carrier.body_at(q)),
@@ -151,7 +151,7 @@ impl Steered {
     /// Puts the target where the jog leads within the time to the next one.
     fn aim(&mut self, carrier: &Carrier) {
         self.held_by = None;
-        let now = self.way.joints().copied().unwrap_or(self.target);
+        let now = self.command.joints().copied().unwrap_or(self.target);
         if self.world.enters_fixed(&self.carried) <= self.enters {
             self.clear = now;
         } else {
@@ -207,7 +207,7 @@ impl Steered {
 
     fn remember(&mut self) {
         let moment =
-            self.columns.moment(&self.task, &self.world, self.course.done, &self.way, |body| self.world.pose(body));
+            self.columns.moment(&self.task, &self.world, self.course.done, &self.command, |body| self.world.pose(body));
         self.moments.push(moment);
     }
 
@@ -229,7 +229,7 @@ impl Steered {
     pub fn joints(&self) -> Joints {
         let given_way =
             self.task.carrier.as_ref().and_then(|carrier| self.world.arm(carrier.body)).map(|state| state.q);
-        given_way.or(self.way.joints().copied()).unwrap_or_default()
+        given_way.or(self.command.joints().copied()).unwrap_or_default()
     }
 
     /// Origin of the flange in the arm's base [m].

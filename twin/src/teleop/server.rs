@@ -108,11 +108,11 @@ pub fn serve(
         frames,
         hosts: Arc::new(Hosts::of(address.ip, &address.names)),
     };
-    let told = Arc::clone(stop);
+    let stopping = Arc::clone(stop);
     let steered = std::thread::Builder::new()
         .name("steering".into())
         .spawn(move || {
-            steering.run(&ordered, &told, |frame| {
+            steering.run(&ordered, &stopping, |frame| {
                 // Nobody may be looking.
                 shown.send_replace(frame.into());
             })

@@ -40,7 +40,7 @@ pub(super) struct Arm {
     pub(super) plan: ArmPlan,
     /// Its first freedom.
     pub(super) first: usize,
-    /// What the controller is told [rad, rad/s].
+    /// The command of the controller [rad, rad/s].
     q_d: Joints,
     dq_d: Joints,
     /// How each joint moves the point of the carried body that is at the world's origin.
@@ -87,7 +87,7 @@ impl Arm {
         true
     }
 
-    /// After a step: the joints are to stay unless they are told to go on.
+    /// After a step: the joints are to stay unless they are commanded to go on.
     pub(super) fn halt(&mut self) {
         self.dq_d = [0.0; MAX_JOINTS];
     }

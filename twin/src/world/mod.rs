@@ -174,8 +174,8 @@ impl World {
         trees.halt(STEP);
     }
 
-    /// Lets a body that is [`Hold::Moved`] go to a pose within the next step; an arm that carries it is told to bring it there,
-    /// and stays where it was told to be before where it cannot.
+    /// Lets a body that is [`Hold::Moved`] go to a pose within the next step; an arm that carries it is commanded to bring it
+    /// there, and keeps the command of before where it cannot.
     pub fn move_to(&mut self, body: usize, pose: &Isometry3<f64>) {
         if let Some(arm) = self.trees.arm_mut(body) {
             arm.aim_at(pose, STEP);

@@ -26,9 +26,10 @@ const STIFF: f64 = 1e-9;
 const SAME: f64 = 3e-3;
 /// Places all nearer to their middle than this are one, which friction does not keep from turning [m].
 const LINE: f64 = 1e-5;
-/// Rounds of finding which places press, and sweeps over the friction of places that slip.
-const ROUNDS: usize = 12;
-const RUBS: usize = 2;
+/// Changes of the set of places that press, at most [1].
+const ACTIVE_SET_CHANGES: usize = 12;
+/// Sweeps over the friction of places that slip [1].
+const FRICTION_SWEEPS: usize = 2;
 
 /// How one freedom moves the patch, and what an impulse at the patch gives to it.
 #[derive(Debug, Clone, Copy)]
@@ -55,8 +56,9 @@ struct Spot {
     parting: f64,
     /// Impulse for a slip of one.
     slip_mass: f64,
+    /// Impulses along the normal and across it [N s].
     load: f64,
-    rub: Vector2<f64>,
+    tangential: Vector2<f64>,
 }
 
 /// The patch within one step.
@@ -112,7 +114,7 @@ impl Patch {
         let axes = Matrix3::from_rows(&[first.transpose(), second.transpose(), normal.transpose()]);
         let places = touching.places();
         let origin = Point3::from(places.iter().map(|p| p.at.coords).sum::<Vector3<f64>>() / places.len() as f64);
-        let none = Spot { x: 0.0, y: 0.0, parting: 0.0, slip_mass: 0.0, load: 0.0, rub: Vector2::zeros() };
+        let none = Spot { x: 0.0, y: 0.0, parting: 0.0, slip_mass: 0.0, load: 0.0, tangential: Vector2::zeros() };
         let mut spots = [none; MOST_PLACES];
         for (spot, place) in spots.iter_mut().zip(places) {
             let from = axes * (place.at - origin);
@@ -126,8 +128,8 @@ impl Patch {
             let before = known
                 .min_by(|a, b| distance(a).total_cmp(&distance(b)))
                 .filter(|known| distance(known) < SAME * SAME)
-                .map_or((0.0, Vector2::zeros()), |(_, load, rub)| (*load, (axes * rub).xy()));
-            *spot = Spot { x: from.x, y: from.y, parting, load: before.0, rub: before.1, ..none };
+                .map_or((0.0, Vector2::zeros()), |(_, load, tangential)| (*load, (axes * tangential).xy()));
+            *spot = Spot { x: from.x, y: from.y, parting, load: before.0, tangential: before.1, ..none };
         }
         let zero = Column { freedom: 0, motion: Vector6::zeros(), answer: Vector6::zeros() };
         Self {
@@ -216,8 +218,15 @@ impl Patch {
     pub(super) fn impulse(&self) -> Vector6<f64> {
         let mut sum = Vector6::zeros();
         sum[2] = self.spin;
-        for Spot { x, y, load, rub, .. } in &self.spots[..self.count] {
-            sum += Vector6::new(rub.x, rub.y, x * rub.y - y * rub.x, *load, y * load, -x * load);
+        for Spot { x, y, load, tangential, .. } in &self.spots[..self.count] {
+            sum += Vector6::new(
+                tangential.x,
+                tangential.y,
+                x * tangential.y - y * tangential.x,
+                *load,
+                y * load,
+                -x * load,
+            );
         }
         sum
     }
@@ -243,7 +252,7 @@ impl Patch {
         if !self.hold_fast(&before, &motion) {
             self.press(&mut motion);
             if !self.hold_still(&mut motion) {
-                self.rub(&mut motion);
+                self.project_friction(&mut motion);
             }
         }
         let change = self.impulse() - before;
@@ -313,7 +322,7 @@ impl Patch {
             return false;
         }
         for (i, spot) in self.spots[..self.count].iter_mut().enumerate() {
-            (spot.load, spot.rub) = (loads[i], shares[i] * loads[i]);
+            (spot.load, spot.tangential) = (loads[i], shares[i] * loads[i]);
         }
         self.spin = turning * pad;
         true
@@ -330,7 +339,7 @@ impl Patch {
         let give = self.give();
         let mut pressing: [bool; MOST_PLACES] = std::array::from_fn(|i| i < n && lacking[i] > 0.0);
         let mut loads = SVector::<f64, MOST_PLACES>::zeros();
-        for _ in 0..ROUNDS {
+        for _ in 0..ACTIVE_SET_CHANGES {
             loads = self.loads(&pressing, &lacking, give);
             let pulling = (0..n).filter(|i| loads[*i] < 0.0).min_by(|a, b| loads[*a].total_cmp(&loads[*b]));
             if let Some(i) = pulling {
@@ -387,16 +396,16 @@ impl Patch {
     }
 
     /// Friction of each place against its slip, up to its cone.
-    fn rub(&mut self, motion: &mut Vector6<f64>) {
-        for _ in 0..RUBS {
+    fn project_friction(&mut self, motion: &mut Vector6<f64>) {
+        for _ in 0..FRICTION_SWEEPS {
             for i in 0..self.count {
-                let Spot { x, y, slip_mass, load, rub, .. } = self.spots[i];
+                let Spot { x, y, slip_mass, load, tangential, .. } = self.spots[i];
                 let slip = Vector2::new(motion[0] - motion[2] * y, motion[1] + motion[2] * x);
-                let (wanted, limit) = (rub - slip * slip_mass, self.friction * load);
+                let (wanted, limit) = (tangential - slip * slip_mass, self.friction * load);
                 let size = wanted.norm();
                 let now = if size > limit { wanted * (limit / size) } else { wanted };
-                self.spots[i].rub = now;
-                let change = now - rub;
+                self.spots[i].tangential = now;
+                let change = now - tangential;
                 let turning = x * change.y - y * change.x;
                 *motion += self.mobility * Vector6::new(change.x, change.y, turning, 0.0, 0.0, 0.0);
             }
@@ -416,7 +425,7 @@ impl Patch {
         for (kept, spot) in memory.places.iter_mut().zip(&self.spots[..self.count]) {
             let back = |v: Vector3<f64>| self.axes.tr_mul(&v);
             let at = self.origin + back(Vector3::new(spot.x, spot.y, 0.0));
-            *kept = (at, spot.load, back(Vector3::new(spot.rub.x, spot.rub.y, 0.0)));
+            *kept = (at, spot.load, back(Vector3::new(spot.tangential.x, spot.tangential.y, 0.0)));
         }
         memory
     }

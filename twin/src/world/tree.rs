@@ -214,7 +214,7 @@ impl Trees {
         }
     }
 
-    /// The same to be told something.
+    /// The same, to command it.
     pub(super) fn arm_mut(&mut self, body: usize) -> Option<&mut Arm> {
         match self.nodes[body].link {
             Link::Arm(arm) => Some(&mut self.arms[arm]),

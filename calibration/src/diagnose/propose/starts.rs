@@ -87,11 +87,11 @@ fn pointed_at<E: Likelihood>(
         numbers.extend(placed(bench, at, scored));
     }
     numbers.extend(without_a_slope(bench, at, candidate));
-    if candidate.is_searched(Search::InStep) {
+    if candidate.is_searched(Search::Periodic) {
         numbers.extend(ripple::start(bench, at, scored.candidate));
     }
     // What an object pivots about changes the hit, of which slopes tell little, and its number decides how it spins besides.
-    if (uneven && !one_probe) || candidate.is_searched(Search::Uneven) {
+    if (uneven && !one_probe) || candidate.is_searched(Search::NonSmooth) {
         numbers.extend(least_cost_aside(bench, at, scored).map(|(_, full)| full));
     }
     numbers
@@ -132,7 +132,7 @@ fn scanned<E: Likelihood>(bench: &Bench<'_, E>, at: (&Hypothesis<E::Own>, &[f64]
     let forms = 0..bench.library.candidates[scored.candidate].alternatives.len();
     let starts = forms.flat_map(|alternative| aside(bench, &Scored { alternative, ..scored.clone() }, &SCANNED));
     let numbers = starts.map(|start| bench.begun(at.0.full.clone(), &start));
-    let ripples = bench.library.candidates[scored.candidate].is_searched(Search::InStep);
+    let ripples = bench.library.candidates[scored.candidate].is_searched(Search::Periodic);
     let in_step = if ripples { ripple::start(bench, at, scored.candidate) } else { None };
     let most = FAR_OFF * bench.plain_cost(&at.0.clips(), &at.0.full, at.1).unwrap_or(f64::INFINITY);
     let start = cheapest_below(bench, at, numbers.chain(in_step), most);

@@ -1,5 +1,5 @@
 //! A ChArUco board at a known place: a chessboard with a marker in each white square, so that every corner between four
-//! squares is told apart from the others even when only some are seen (Garrido-Jurado et al. 2014). Rough is enough:
+//! squares is distinguished from the others even when only some are seen (Garrido-Jurado et al. 2014). Rough is enough:
 //! the robot's outline has the last word on where the camera stands.
 
 use super::dictionary::Dictionary;

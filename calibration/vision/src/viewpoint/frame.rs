@@ -119,7 +119,7 @@ impl Frame {
         self.levels[level].factor
     }
 
-    /// Whether the robot is told apart by a mask, not by edges of a photo.
+    /// Whether the robot is segmented by a mask, not by edges of a photo.
     pub fn has_mask(&self) -> bool {
         matches!(self.levels[0].kind, Kind::Silhouette(_))
     }

@@ -308,7 +308,7 @@ mod tests {
         for seed in 0..40 {
             let random = &mut Pcg64::seed_from_u64(seed);
             let mut truth = board(random);
-            // What looks like a crossing where one belongs cannot be told from one.
+            // What looks like a crossing where one belongs cannot be distinguished from one.
             let mut clutter = clutter(60, random);
             clutter.retain(|c| truth.iter().all(|(_, corner)| length(minus(corner.at, c.at)) > 8.0));
             truth.retain(|([i, j], _)| (0..7).contains(i) && (0..9).contains(j));

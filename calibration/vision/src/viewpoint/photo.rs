@@ -21,7 +21,7 @@ pub struct Photo {
     clear: f64,
 }
 
-/// Directions told apart, evenly over half a turn; an edge counts for those within an eighth of a turn and a half.
+/// Directions that are distinguished, evenly over half a turn; an edge counts for those within an eighth of a turn and a half.
 const DIRECTIONS: usize = 12;
 const TOLERANCE: f64 = 0.30;
 /// Blur: a bell with a sigma of one pixel.

@@ -5,7 +5,7 @@
 //! the profile is explained whole: what lies beyond the edge has one brightness, what lies on this side another, that changes
 //! with the square root of the distance from the edge, as the normal of a smooth body does towards its outline (Koenderink
 //! 1984). Brightnesses follow by least squares for every place that the edge may have; the place that leaves least is the
-//! answer. How far it depends on the explanation is told too: where an edge would lie whose near side changes evenly.
+//! answer. How far it depends on the explanation is reported too: where an edge would lie whose near side changes evenly.
 
 use nalgebra::{SMatrix, SVector};
 use std::sync::LazyLock;
@@ -105,7 +105,7 @@ fn best<'a>(shapes: &'a [Shape], channels: &[Samples]) -> Option<(&'a Shape, f64
 }
 
 impl Shape {
-    /// `None` where the parts of the profile cannot be told apart.
+    /// `None` where the parts of the profile cannot be separated.
     fn new(near: Near, away: f64) -> Option<Self> {
         let parts = |x: f64| {
             let depth = away - x;

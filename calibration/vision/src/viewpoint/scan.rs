@@ -39,7 +39,7 @@ pub(super) fn places(start: &Isometry3<f64>, reach: &Reach) -> Vec<Vector3<f64>>
         .collect()
 }
 
-/// The best poses around `start`, the best first and each of its own; and how many times the robot was drawn. `looked` is told
+/// The best poses around `start`, the best first and each of its own; and how many times the robot was drawn. `looked` is called
 /// of every one of the [`places`] once it was looked from.
 pub(super) fn scan(
     frames: &[Frame],

@@ -37,7 +37,7 @@ pub fn search(frames: &[Frame], shape: &Shape, lens: &Lens, method: Method, seed
     for place in 0..places {
         let around = std::f64::consts::TAU * (place % AROUND) as f64 / AROUND as f64;
         let height = HEIGHTS[place / AROUND % HEIGHTS.len()];
-        // A long lens stands further away: what is far is told by the field of view.
+        // A long lens stands further away: what is far follows from the field of view.
         let away =
             DISTANCES[place / AROUND / HEIGHTS.len()] * (lens.focal[1] / (2.0 * lens.centre[1].max(1.0))).max(0.5);
         let from = Vector3::new(around.cos() * height.cos(), around.sin() * height.cos(), height.sin()) * away;

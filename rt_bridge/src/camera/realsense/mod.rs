@@ -35,10 +35,10 @@ use stream::Stream;
 pub fn serve(source: &CameraSource, cell: &Cell, notices: Sender<Notice>) -> Result<Service, ServiceError> {
     let (name, camera, source) = (source.to_string(), cell.camera.clone().unwrap_or_default(), source.clone());
     let pixels = Arc::new(OnceLock::new());
-    let told = pixels.clone();
+    let shared = pixels.clone();
     let open = move || {
         let stream = Stream::open(&source, &camera)?;
-        let _as_before = told.set(stream.pixels());
+        let _as_before = shared.set(stream.pixels());
         Ok(stream)
     };
     let lines = move |node: &_| PictureLines::open(node, pixels.get().copied().unwrap_or_default());

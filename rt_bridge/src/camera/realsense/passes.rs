@@ -72,7 +72,7 @@ fn merge(files: &[Output], mut writer: ClipWriter<Output>, camera: &CameraInfo) 
     Ok(())
 }
 
-/// The pass whose next pair is the earliest; one that cannot be read comes first, so that it is told.
+/// The pass whose next pair is the earliest; one that cannot be read comes first, so that it is reported.
 fn earliest(passes: &mut [Peekable<Pairs>]) -> Option<usize> {
     let next = |(pass, pairs): (usize, &mut Peekable<Pairs>)| {
         let stamp = pairs.peek()?.as_ref().map_or(0, |[_, depth]| depth.0.device_ns);

@@ -4,7 +4,7 @@ use super::registers::{Action, Activation, Status};
 use shared_mem::cell::{Gripper, GripperModel};
 use shared_mem::msg::gripper::{GripperAction, GripperCommand, GripperState};
 
-/// One gripper's scales and what it was told.
+/// One gripper's scales and the last action sent to it.
 #[derive(Debug, Clone)]
 pub(super) struct Orders {
     widest: f64,
@@ -13,7 +13,7 @@ pub(super) struct Orders {
     speeds: [f64; 2],
     /// Forces of counts 0 and 255 [N].
     forces: [f64; 2],
-    told: Action,
+    sent: Action,
     waiting: Option<GripperCommand>,
     /// An activation that was asked for and is not confirmed yet.
     homing: bool,
@@ -32,7 +32,7 @@ impl Orders {
             counts: gripper.counts().map(f64::from),
             speeds,
             forces,
-            told: Action::default(),
+            sent: Action::default(),
             waiting: None,
             homing: false,
             width_d: None,
@@ -51,8 +51,8 @@ impl Orders {
         if self.homing {
             // The activation bit has to fall before it can rise.
             let rising = Action { active: true, ..Action::default() };
-            if !self.told.active {
-                return (status.activation == Activation::Reset).then(|| self.tell(rising));
+            if !self.sent.active {
+                return (status.activation == Activation::Reset).then(|| self.send(rising));
             }
             self.homing = status.activation != Activation::Done;
             return None;
@@ -61,7 +61,7 @@ impl Orders {
         if matches!(order.action, GripperAction::Stop) {
             self.waiting = None;
             self.width_d = Some(self.width(status.position));
-            return Some(self.tell(Action { active: status.activation != Activation::Reset, ..Action::default() }));
+            return Some(self.send(Action { active: status.activation != Activation::Reset, ..Action::default() }));
         }
         if order.action == GripperAction::Home || status.activation != Activation::Done {
             if order.action == GripperAction::Home {
@@ -69,7 +69,7 @@ impl Orders {
                 self.width_d = Some(self.widest);
             }
             self.homing = true;
-            return Some(self.tell(Action::default()));
+            return Some(self.send(Action::default()));
         }
         self.waiting = None;
         self.width_d = Some(order.width.clamp(0.0, self.widest));
@@ -79,18 +79,18 @@ impl Orders {
         };
         let speed = if order.speed > 0.0 { part(order.speed, self.speeds) } else { 255 };
         let force = if order.force > 0.0 { part(order.force, self.forces) } else { 0 };
-        Some(self.tell(Action { active: true, go: true, position: target, speed, force }))
+        Some(self.send(Action { active: true, go: true, position: target, speed, force }))
     }
 
-    fn tell(&mut self, action: Action) -> Action {
-        self.told = action;
+    fn send(&mut self, action: Action) -> Action {
+        self.sent = action;
         action
     }
 
     /// The state in SI units. The force is the one the gripper limits its motor to, while it holds something.
     pub(super) fn state(&self, status: &Status, stamp_ns: u64) -> GripperState {
         let width = self.width(status.position);
-        let limit = self.forces[0] + (self.forces[1] - self.forces[0]) * f64::from(self.told.force) / 255.0;
+        let limit = self.forces[0] + (self.forces[1] - self.forces[0]) * f64::from(self.sent.force) / 255.0;
         GripperState {
             stamp_ns,
             width,
@@ -151,11 +151,11 @@ mod tests {
         let mut orders = Orders::new(&Gripper::new(GripperModel::Robotiq2F140));
         orders.take(&go(0.1));
         orders.take(&go(0.0));
-        let told = orders.next(&status(3, 3)).expect("an action");
-        assert_eq!((told.position, told.go), (230, true));
+        let action = orders.next(&status(3, 3)).expect("an action");
+        assert_eq!((action.position, action.go), (230, true));
         orders.take(&GripperCommand { action: GripperAction::Stop, ..go(f64::NAN) });
-        let told = orders.next(&status(3, 100)).expect("an action");
-        assert_eq!((told.active, told.go), (true, false));
+        let action = orders.next(&status(3, 100)).expect("an action");
+        assert_eq!((action.active, action.go), (true, false));
         orders.take(&go(f64::NAN));
         assert_eq!(orders.next(&status(3, 100)), None, "a width that is no number is no order");
     }
@@ -164,8 +164,8 @@ mod tests {
     fn what_it_holds_it_holds_with_the_force_asked_for() {
         let mut orders = Orders::new(&Gripper::new(GripperModel::Robotiq2F85));
         orders.take(&GripperCommand { action: GripperAction::Grasp, force: 235.0, ..go(0.03) });
-        let told = orders.next(&status(3, 3)).expect("an action");
-        assert_eq!((told.position, told.force), (255, 255));
+        let action = orders.next(&status(3, 3)).expect("an action");
+        assert_eq!((action.position, action.force), (255, 255));
         let state = orders.state(&Status::from_registers([0xB900, 0x00FF, 0xBD00]), 0);
         assert_eq!((state.grasped, state.force), (1, 235.0));
     }
@@ -185,8 +185,8 @@ mod tests {
             let action = [GripperAction::Move, GripperAction::Grasp, GripperAction::Stop, GripperAction::Home][usize::from(action)];
             orders.take(&GripperCommand { action, width, speed, force, ..GripperCommand::default() });
             let status = Status::from_registers(registers);
-            if let Some(told) = orders.next(&status) {
-                prop_assert!(!told.go || status.activation == Activation::Done);
+            if let Some(action) = orders.next(&status) {
+                prop_assert!(!action.go || status.activation == Activation::Done);
             }
             prop_assert!((0.0..=0.085).contains(&orders.state(&status, 0).width));
         }

@@ -22,7 +22,7 @@ const STATION: u8 = 9;
 const PATIENCE: Duration = Duration::from_millis(100);
 /// Questions that may go without a good answer.
 const TRIES: u32 = 3;
-/// What is told to be checked when answers come damaged.
+/// What a person is asked to check when answers come damaged.
 const WIRING: &str = "the shield, the ground wire and that A and B are not swapped";
 
 /// A Robotiq 2F at a serial port.

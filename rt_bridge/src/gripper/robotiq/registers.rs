@@ -16,7 +16,7 @@ const ACTIVE: u16 = 1;
 /// Bit of "go to the position asked for".
 const GO: u16 = 1 << 3;
 
-/// What the gripper is told.
+/// An action of the gripper, as it is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Action {
     /// Be active; the change from `false` to `true` makes the gripper find its range.

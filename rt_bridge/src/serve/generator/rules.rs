@@ -42,7 +42,7 @@ pub(in crate::serve) struct JointRules {
 }
 
 impl JointRules {
-    /// Judges the step from `last` to `next`. A discontinuity outranks what it leads to, so it is told alone.
+    /// Judges the step from `last` to `next`. A discontinuity outranks what it leads to, so it is reported alone.
     pub(super) fn check(&self, last: &Trace, next: &Trace, names: &Names) -> Verdict {
         let (mut jumps, mut speeding, mut outside) = (Vec::new(), false, false);
         for (i, limits) in self.limits.counted().enumerate() {

@@ -127,7 +127,7 @@ pub(super) struct Robot {
 }
 
 impl Robot {
-    /// The robot of a cell, idle where `[simulation]` puts it. `theta` are parameters and effects that no client is told.
+    /// The robot of a cell, idle where `[simulation]` puts it. `theta` are parameters and effects that are hidden from clients.
     pub(super) fn new(cell: &Cell, theta: Option<&Theta>) -> Result<Self, ServeError> {
         let body = Body::new(cell, theta)?;
         let limits = Limits::of(cell, body.model());

@@ -158,7 +158,7 @@ impl<T: Real, const C: usize> Pixels<T, C> {
         slope: &Planes<T, C>,
     ) -> Vec<Sums<T, C>> {
         let (first, inside) = place(tile, slope.size);
-        let mut ways = self.ways(slope, first, inside);
+        let mut lanes = self.backward_lanes(slope, first, inside);
         let mut out = vec![Sums::default(); list.len()];
         for (number, sums) in list[..self.blended].iter().zip(&mut out) {
             let splat = &drawn[*number as usize];
@@ -168,7 +168,7 @@ impl<T: Real, const C: usize> Pixels<T, C> {
                 let mut gathered = Gathered::new();
                 for row in rows.clone() {
                     let y = T::of((first[1] + row) as f64) - splat.centre[1];
-                    ways[half][row].take(splat, &x, y, &mut gathered);
+                    lanes[half][row].take(splat, &x, y, &mut gathered);
                 }
                 gathered.sum(&x, sums);
             }
@@ -176,26 +176,31 @@ impl<T: Real, const C: usize> Pixels<T, C> {
         out
     }
 
-    /// Where the way back begins at each pixel.
-    fn ways(&self, slope: &Planes<T, C>, first: [usize; 2], inside: [usize; 2]) -> Box<[[Way<T, C>; TILE]; HALVES]> {
+    /// The adjoints at each pixel before its first splat.
+    fn backward_lanes(
+        &self,
+        slope: &Planes<T, C>,
+        first: [usize; 2],
+        inside: [usize; 2],
+    ) -> Box<[[BackwardLanes<T, C>; TILE]; HALVES]> {
         let none = [T::zero(); LANES];
-        let dark = Way { left: none, rest: none, slope: [none; C] };
-        let mut ways = Box::new([[dark; TILE]; HALVES]);
-        for (half, (ways, ends)) in ways.iter_mut().zip(&self.rows).enumerate() {
+        let dark = BackwardLanes { left: none, rest: none, slope: [none; C] };
+        let mut lanes = Box::new([[dark; TILE]; HALVES]);
+        for (half, (lanes, ends)) in lanes.iter_mut().zip(&self.rows).enumerate() {
             for row in 0..inside[1] {
                 let begin = (first[1] + row) * slope.size[0] + first[0] + half * LANES;
                 for l in (0..LANES).filter(|l| half * LANES + l < inside[0]) {
-                    let (way, end) = (&mut ways[row], &ends[row]);
-                    way.left[l] = T::one();
-                    way.rest[l] = end.left[l] * slope.left[begin + l];
+                    let (lane, end) = (&mut lanes[row], &ends[row]);
+                    lane.left[l] = T::one();
+                    lane.rest[l] = end.left[l] * slope.left[begin + l];
                     for c in 0..C {
-                        way.slope[c][l] = slope.channels[c][begin + l];
-                        way.rest[l] += end.channels[c][l] * way.slope[c][l];
+                        lane.slope[c][l] = slope.channels[c][begin + l];
+                        lane.rest[l] += end.channels[c][l] * lane.slope[c][l];
                     }
                 }
             }
         }
-        ways
+        lanes
     }
 }
 
@@ -220,9 +225,9 @@ impl<T: Real, const C: usize> Lanes<T, C> {
     }
 }
 
-/// Eight pixels on the way back.
+/// Adjoints of eight pixels.
 #[derive(Clone, Copy)]
-struct Way<T, const C: usize> {
+struct BackwardLanes<T, const C: usize> {
     /// Light that reaches the next splat.
     left: [T; LANES],
     /// What all splats from here on add to the loss, in its linear part, with the light behind them.
@@ -237,7 +242,7 @@ struct Gathered<T, const C: usize> {
     values: [[T; LANES]; C],
 }
 
-impl<T: Real, const C: usize> Way<T, C> {
+impl<T: Real, const C: usize> BackwardLanes<T, C> {
     #[inline(always)]
     fn take(&mut self, splat: &Drawn<T, C>, x: &[T; LANES], y: T, gathered: &mut Gathered<T, C>) {
         let (faintest, spent, most) = (T::of(FAINTEST), T::of(SPENT), T::of(MOST));

@@ -4,7 +4,7 @@ use super::blend::Sums;
 use super::tiles::{Drawn, normal};
 use super::{COLOR_PLANE, Parameters};
 use crate::harmonics::{slopes, values};
-use crate::project::{Bell, View, Way, unit};
+use crate::project::{Bell, Forward, View, unit};
 use crate::real::Real;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
@@ -28,7 +28,7 @@ impl<T: Real> Back<T> {
     ) -> Self {
         let none = Self { centre: [T::zero(); 3], turn: [T::zero(); 4], log_sigma: [T::zero(); 3], logit: T::zero() };
         let bell = splats.bell(number);
-        let Some(way) = view.way(&bell) else { return none };
+        let Some(forward) = view.forward(&bell) else { return none };
         let [one, x, y, xx, xy, yy] = sums.bell;
         let [kxx, kxy, kyy] = drawn.conic;
         let half = T::of(0.5);
@@ -38,22 +38,22 @@ impl<T: Real> Back<T> {
         let inverse = Matrix2::new(kxx, kxy, kxy, kyy);
         let covariance = -(inverse * conic * inverse);
 
-        let spread = covariance * way.spread * T::of(2.0);
-        let log_sigma = [0, 1, 2].map(|k| spread.column(k).dot(&way.seen_axes.column(k)) * bell.sigma[k]);
+        let spread = covariance * forward.spread * T::of(2.0);
+        let log_sigma = [0, 1, 2].map(|k| spread.column(k).dot(&forward.seen_axes.column(k)) * bell.sigma[k]);
         let seen_axes = spread * Matrix3::from_diagonal(&bell.sigma);
         let focal = Matrix2::from_diagonal(&Vector2::from(view.focal));
-        let mut axes = (focal * way.bent * way.divided).transpose() * seen_axes;
+        let mut axes = (focal * forward.bent * forward.divided).transpose() * seen_axes;
         // Over the centre, camera frame, from the fourth channel.
         let mut over_at = Vector3::z() * sums.values[3];
         if C == COLOR_PLANE {
-            let (axis, sign) = normal(&bell.sigma, &way.axes, &way.at);
-            over_at = way.axes.column(axis) * (sign * sums.values[3]);
-            (0..3).for_each(|i| axes[(i, axis)] += sign * (sums.values[4 + i] + sums.values[3] * way.at[i]));
+            let (axis, sign) = normal(&bell.sigma, &forward.axes, &forward.at);
+            over_at = forward.axes.column(axis) * (sign * sums.values[3]);
+            (0..3).for_each(|i| axes[(i, axis)] += sign * (sums.values[4 + i] + sums.values[3] * forward.at[i]));
         }
         let turn = turned(&bell.turn, &(view.rotation.transpose() * axes));
 
-        let slope = seen_axes * way.axes.transpose();
-        let at = slope_back(view, &way, &(focal * slope)) + pixel_back(view, &way, &(focal * pixel)) + over_at;
+        let slope = seen_axes * forward.axes.transpose();
+        let at = slope_back(view, &forward, &(focal * slope)) + pixel_back(view, &forward, &(focal * pixel)) + over_at;
         let color = [sums.values[0], sums.values[1], sums.values[2]];
         let centre = view.rotation.transpose() * at + color_back(splats, number, view, &bell, drawn, color, harmonics);
         // Over the logarithm of opacity; that one's slope over the logit is the light that passes.
@@ -81,24 +81,24 @@ fn turned<T: Real>(turn: &[T; 4], g: &Matrix3<T>) -> [T; 4] {
 }
 
 /// Over the centre, camera frame, from the slope over the projection's own slope; `focal` is multiplied in already.
-fn slope_back<T: Real>(view: &View<T>, way: &Way<T>, g: &Matrix2x3<T>) -> Vector3<T> {
-    let inverse = way.divided[(0, 0)];
-    let [x, y] = way.held;
-    let bent = g * way.divided.transpose();
-    let divided = way.bent.transpose() * g;
+fn slope_back<T: Real>(view: &View<T>, forward: &Forward<T>, g: &Matrix2x3<T>) -> Vector3<T> {
+    let inverse = forward.divided[(0, 0)];
+    let [x, y] = forward.held;
+    let bent = g * forward.divided.transpose();
+    let divided = forward.bent.transpose() * g;
     let [over_x, over_y] = view.distortion.curvature(x, y);
     let mut held = [bent.dot(&over_x) - divided[(0, 2)] * inverse, bent.dot(&over_y) - divided[(1, 2)] * inverse];
     let mut over_inverse = divided[(0, 0)] + divided[(1, 1)] - divided[(0, 2)] * x - divided[(1, 2)] * y;
     // What is held at an end does not follow the centre.
-    (0..2).for_each(|i| held[i] = if way.is_own[i] { held[i] } else { T::zero() });
-    over_inverse += held[0] * way.at.x + held[1] * way.at.y;
+    (0..2).for_each(|i| held[i] = if forward.is_own[i] { held[i] } else { T::zero() });
+    over_inverse += held[0] * forward.at.x + held[1] * forward.at.y;
     Vector3::new(held[0] * inverse, held[1] * inverse, -over_inverse * inverse * inverse)
 }
 
 /// Over the centre, camera frame, from the slope over where it lands.
-fn pixel_back<T: Real>(view: &View<T>, way: &Way<T>, g: &Vector2<T>) -> Vector3<T> {
-    let inverse = way.divided[(0, 0)];
-    let (x, y) = (way.at.x * inverse, way.at.y * inverse);
+fn pixel_back<T: Real>(view: &View<T>, forward: &Forward<T>, g: &Vector2<T>) -> Vector3<T> {
+    let inverse = forward.divided[(0, 0)];
+    let (x, y) = (forward.at.x * inverse, forward.at.y * inverse);
     let plane = view.distortion.bend(x, y).1.transpose() * g * inverse;
     Vector3::new(plane.x, plane.y, -(plane.x * x + plane.y * y))
 }

@@ -29,10 +29,10 @@ pub(super) fn drawn<T: Real, const C: usize>(splats: &Parameters<T>, view: &View
         values[..3].copy_from_slice(&seen.color);
         values[3] = seen.depth;
         if C == COLOR_PLANE {
-            let way = view.way(&bell)?;
-            let (axis, sign) = normal(&bell.sigma, &way.axes, &way.at);
-            let normal = way.axes.column(axis) * sign;
-            values[3] = normal.dot(&way.at);
+            let forward = view.forward(&bell)?;
+            let (axis, sign) = normal(&bell.sigma, &forward.axes, &forward.at);
+            let normal = forward.axes.column(axis) * sign;
+            values[3] = normal.dot(&forward.at);
             (0..3).for_each(|i| values[4 + i] = normal[i]);
         }
         let (centre, conic, opacity, reach, depth) = (seen.centre, seen.conic, seen.opacity, seen.reach, seen.depth);

@@ -80,7 +80,7 @@ impl<'a> Tree<'a> {
         if !named.is_empty() && unknown.is_empty() {
             return self.named(named);
         }
-        let choice = self.told();
+        let choice = self.stated();
         // Other names for all of its joints are what recordings call them; a few among its own are slips of the pen.
         match &choice {
             Ok(choice) if choice.joints.len() == named.len() => {}
@@ -157,7 +157,7 @@ impl<'a> Tree<'a> {
     }
 
     /// The joints that names, frames, limits and lengths tell.
-    fn told(&self) -> Result<Choice<'a>, ModelError> {
+    fn stated(&self) -> Result<Choice<'a>, ModelError> {
         let mut choice = Choice { left: self.moving_base(), ..Choice::default() };
         let mut link = self.root;
         while let Some(joint) = self.next(link, &mut choice)? {

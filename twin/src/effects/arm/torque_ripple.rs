@@ -23,7 +23,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::size("amplitude", "N m", [0.0, 0.5], 0.0)
             .per_joint()
             .elsewhere(Elsewhere::OfTorqueLimit([0.0, 0.05])),
-        Parameter::form("order", "1", [1.0, 400.0], 200.0).per_joint().searched(Search::InStep).begun_at(&[
+        Parameter::form("order", "1", [1.0, 400.0], 200.0).per_joint().searched(Search::Periodic).begun_at(&[
             &[10.0],
             &[20.0],
             &[40.0],

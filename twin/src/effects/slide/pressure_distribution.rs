@@ -21,7 +21,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::size("reach", "1", [0.4, 1.2], 1.0).within(0.01, 2.0),
         Parameter::form("pivot", "1", [0.4, 1.2], 1.0)
             .within(0.01, 2.0)
-            .searched(Search::Uneven)
+            .searched(Search::NonSmooth)
             // Feet, and the corners of the base.
             .begun_at(&[&[0.75], &[1.0]]),
     ],

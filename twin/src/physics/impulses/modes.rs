@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 
 /// Most unknowns: one for a place that slips, three for one that sticks. A box on a face has room for it, with a tool.
 const UNKNOWNS: usize = 12;
-/// Times that places are supposed to do something else.
-const ROUNDS: usize = 6;
+/// Changes of what places are supposed to do, at most [1].
+const MODE_CHANGES: usize = 6;
 /// Give of a place, as a share of the largest coefficient. It decides what equations of rigid places leave open: the four
 /// corners of a face share its load evenly.
 const GIVE: f64 = 1e-6;
@@ -59,8 +59,8 @@ impl Mode {
         if push <= 0.0 {
             return Self::Parts;
         }
-        let rubbing = impulse - contact.normal * push;
-        let inside = rubbing.norm() < contact.friction * push * (1.0 - 1e-9);
+        let friction_impulse = impulse - contact.normal * push;
+        let inside = friction_impulse.norm() < contact.friction * push * (1.0 - 1e-9);
         if inside { Self::Sticks } else { Self::Slips(impulse / push) }
     }
 }
@@ -84,7 +84,7 @@ impl<const N: usize> Impulses<'_, N> {
 
     /// The impulses on a body that nothing has pushed yet.
     fn supposing(&self, mut modes: [Mode; N]) -> Option<[Vector3<f64>; N]> {
-        for _ in 0..ROUNDS {
+        for _ in 0..MODE_CHANGES {
             let impulses = self.answer(&modes)?;
             if !self.corrected(&mut modes, &impulses) {
                 return Some(impulses);
@@ -145,11 +145,11 @@ impl<const N: usize> Impulses<'_, N> {
         let mut corrected = false;
         for i in 0..self.count {
             let Contact { lever, normal, friction, .. } = self.places[i].contact;
-            let (push, rubbing) = (push(i), impulses[i] - normal * push(i));
+            let (push, friction_impulse) = (push(i), impulses[i] - normal * push(i));
             let after = self.relative(i) + velocity + spin.cross(&lever);
             let instead = match modes[i] {
-                Mode::Sticks if rubbing.norm() > friction * push => {
-                    Mode::Slips(normal + rubbing * (friction / rubbing.norm()))
+                Mode::Sticks if friction_impulse.norm() > friction * push => {
+                    Mode::Slips(normal + friction_impulse * (friction / friction_impulse.norm()))
                 }
                 Mode::Slips(along) if after.dot(&(along - normal)) > STILL * friction => Mode::Sticks,
                 _ => continue,

@@ -38,14 +38,16 @@ fn broken(body: &FreeBody, places: &[Contact], impulses: &[Vector3<f64>]) -> f64
     let of_place = |(contact, impulse): (&Contact, &Vector3<f64>)| {
         let relative = body.velocity + body.angular_velocity.cross(&contact.lever) - contact.surface_velocity;
         let (parting, push) = (relative.dot(&contact.normal), impulse.dot(&contact.normal));
-        let (slip, rubbing) = (relative - contact.normal * parting, impulse - contact.normal * push);
-        let room = contact.friction * push - rubbing.norm();
+        let (slip, friction_impulse) = (relative - contact.normal * parting, impulse - contact.normal * push);
+        let room = contact.friction * push - friction_impulse.norm();
         let sinks = contact.least_parting - parting;
         let pulls = -push * INVERSE_MASS;
         let parts_but_pushes = (parting - contact.least_parting).min(push * INVERSE_MASS);
         let beyond_the_cone = -room * INVERSE_MASS;
         let slips_inside_the_cone = slip.norm().min(room * INVERSE_MASS);
-        let driven = slip.dot(&rubbing.try_normalize(0.0).unwrap_or_default()).min(rubbing.norm() * INVERSE_MASS);
+        let driven = slip
+            .dot(&friction_impulse.try_normalize(0.0).unwrap_or_default())
+            .min(friction_impulse.norm() * INVERSE_MASS);
         [sinks, pulls, parts_but_pushes, beyond_the_cone, slips_inside_the_cone, driven].into_iter().fold(0.0, f64::max)
     };
     places.iter().zip(impulses).map(of_place).fold(0.0, f64::max)

@@ -134,7 +134,7 @@ pub fn effect_settings(info: &'static EffectInfo, robot: &Robot, dof: usize) -> 
         let flanks = info.parameters.iter().any(|parameter| parameter.search == Search::Threshold);
         let hits = info.stage != Stage::Control || flanks;
         let share = match parameter.search {
-            Search::InStep => ORDER_STEP,
+            Search::Periodic => ORDER_STEP,
             _ if hits => ROUGH_STEP,
             _ => EFFECT_STEP,
         };
