@@ -153,7 +153,7 @@ impl Dome<'_> {
         roll: f64,
     ) -> Option<Joints> {
         let target = looking(place, &self.at, roll);
-        let joints = body.model().reach(start, &self.flange_from_camera, &target)?;
+        let joints = body.model().reach(start, &self.flange_from_camera, &target, None)?;
         let inside = limits.iter().zip(&joints).all(|(l, q)| (l.q_min + MARGIN..=l.q_max - MARGIN).contains(q));
         (inside && self.is_free(body, &joints)).then_some(joints)
     }

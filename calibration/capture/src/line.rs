@@ -20,7 +20,7 @@ const SHORTEST: f64 = 0.2;
 /// Joints that bring the tool's end to `target`, the nearest ones to `from`; `None` out of reach.
 pub fn reach(body: &Body, from: &Joints, target: &Isometry3<f64>) -> Option<Joints> {
     let tip = Isometry3::translation(0.0, 0.0, body.model().tool_length());
-    body.model().reach(from, &tip, target)
+    body.model().reach(from, &tip, target, None)
 }
 
 /// Joints that bring the tool's end to `target` after turning it about its own axis by `turn` [rad], step by step, so that

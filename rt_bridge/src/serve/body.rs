@@ -177,7 +177,7 @@ mod tests {
         let [flange, tip] = [model.flange(model.ready()).isometry(), model.tip(model.ready()).isometry()];
         let reach = |x: f64, y: f64, z: f64| {
             let way = Translation3::from(Vector3::new(x, y, z) - tip.translation.vector);
-            model.reach(model.ready(), &nalgebra::one(), &(way * flange)).expect("within reach")
+            model.reach(model.ready(), &nalgebra::one(), &(way * flange), None).expect("within reach")
         };
         let (from, to) = (reach(0.5, -0.07, 0.05), reach(0.5, 0.03, 0.05));
         cell.simulation.q = from[..7].to_vec();

@@ -6,10 +6,10 @@
 //!
 //! Source: Albu-Schaeffer, Ott, Hirzinger, A Unified Passivity-based Control Framework, IJRR 26 (2007).
 
-use super::kinematics::{Frame, Jacobian, difference, seven, turned};
+use super::kinematics::{Frame, Jacobian, seven, turned};
 use nalgebra::{Matrix6, SMatrix, Vector6};
 use shared_mem::msg::{MAX_JOINTS, joints_from};
-use twin::arm::{JointState, Joints};
+use twin::arm::{JointState, Joints, pose_difference};
 
 /// Stiffness of the free joint motion [N m/rad]; its damping is `2 sqrt` of it. Weak beside any Cartesian stiffness.
 const NULLSPACE: f64 = 10.0;
@@ -21,7 +21,7 @@ const DAMPING: f64 = 1e-6;
 pub(super) fn torque(frame: &Frame, stiffness: &[f64; 6], state: &JointState, desired: &JointState) -> Joints {
     let jacobian = frame.jacobian(&state.q);
     let (pose, wanted) = (frame.pose(&state.q), frame.pose(&desired.q));
-    let error = turned(&pose.rotation.inverse(), &difference(&pose, &wanted));
+    let error = turned(&pose.rotation.inverse(), &pose_difference(&pose, &wanted));
     let rate = turned(&pose.rotation.inverse(), &(frame.twist(desired) - jacobian * seven(&state.dq)));
     let k = Vector6::from(*stiffness);
     let wrench = k.component_mul(&error) + k.map(|k| 2.0 * k.sqrt()).component_mul(&rate);

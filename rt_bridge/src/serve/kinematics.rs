@@ -26,6 +26,12 @@ impl Frame<'_> {
         Jacobian::from_fn(|row, column| columns[column][row])
     }
 
+    /// Joint positions near `from` with the frame at `target` and, where given, the elbow's joint at `elbow` [rad]; `None` where
+    /// there are none.
+    pub(super) fn reach(&self, from: &Joints, target: &Isometry3<f64>, elbow: Option<f64>) -> Option<Joints> {
+        self.model.reach(from, &self.on_flange, target, elbow.map(|position| (ELBOW, position)))
+    }
+
     /// Velocity of the frame's origin [m/s], then angular velocity [rad/s].
     pub(super) fn twist(&self, state: &JointState) -> Vector6<f64> {
         self.jacobian(&state.q) * seven(&state.dq)
@@ -35,13 +41,6 @@ impl Frame<'_> {
 /// The joints that count, as a vector.
 pub(super) fn seven(joints: &Joints) -> SVector<f64, 7> {
     SVector::from_column_slice(&joints[..7])
-}
-
-/// What leads from one pose to another: way [m], then turn about base axes [rad].
-pub(super) fn difference(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
-    let way = to.translation.vector - from.translation.vector;
-    let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
-    Vector6::new(way.x, way.y, way.z, turn.x, turn.y, turn.z)
 }
 
 /// A wrench or twist in other axes.

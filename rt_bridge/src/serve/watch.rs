@@ -4,11 +4,11 @@ use super::body::Body;
 use super::faults::{Fault, all};
 use super::generator::Surroundings;
 use super::generator::rules::{END_EFFECTOR_SPEED, JointRules, exceeds, highest_speed};
-use super::kinematics::difference;
 use super::motion::Motion;
 use super::settings::Settings;
 use crate::arm::ReflexErrors;
 use crate::safety::JointLimits;
+use twin::arm::pose_difference;
 
 /// How far over its limit a speed may be measured before the robot stops: a controller follows with some error.
 const MARGIN: f64 = 1.05;
@@ -95,7 +95,7 @@ pub(super) fn deviates(
 ) -> bool {
     let Some(desired) = motion.generator.joints() else { return false };
     let ee = Surroundings::new(body.model(), rules, settings).ee;
-    let miss = difference(&ee.pose(&body.measured.q), &ee.pose(&desired.q));
+    let miss = pose_difference(&ee.pose(&body.measured.q), &ee.pose(&desired.q));
     let elbow = (body.measured.q[2] - desired.q[2]).abs();
     let found = [miss.fixed_rows::<3>(0).norm(), miss.fixed_rows::<3>(3).norm(), elbow];
     found.iter().zip(allowed).any(|(found, allowed)| found > allowed)

@@ -13,8 +13,7 @@
 //! | `limits` | [`Limits`]: how far, fast and hard each joint may go |
 //! | `inertia` | mass properties of bodies |
 //! | `kinematics` | flange, Jacobian |
-//! | `reach` | joints that bring the flange to a pose |
-//! | `nearest` | joints within their limits that bring it as near to a pose as they can |
+//! | `inverse_kinematics` | joints that bring the flange to a pose, or within their limits as near to it as they can |
 //! | `follower` | [`Follower`]: the way to a target that may change at any time (the only `rsruckig` code of the product but the capture's plans) |
 //! | `hull` | [`ArmHull`]: the space that links and tool take |
 //! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
@@ -36,13 +35,12 @@ mod fr3;
 mod gains;
 mod hull;
 mod inertia;
+mod inverse_kinematics;
 mod kernel;
 mod kinematics;
 mod limits;
 mod model;
-mod nearest;
 mod parts;
-mod reach;
 mod spatial;
 mod step;
 mod trailing;
@@ -59,11 +57,11 @@ pub use follower::Follower;
 pub use gains::{damping_range, stiffness_range};
 pub use hull::{ArmHull, Extent, MOST_BALLS};
 pub use inertia::MassProperties;
+pub use inverse_kinematics::{Nearest, pose_difference};
 pub use kinematics::Jacobian;
 pub use limits::{JointLimits, Limits, TORQUE_RATE};
 pub use model::ArmModel;
 pub(crate) use model::FREE_FALL;
-pub use nearest::Nearest;
 pub use parts::Part;
 pub use shared_mem::msg::{Joints, MAX_JOINTS};
 pub use trailing::{Trail, Trailing};

@@ -109,7 +109,7 @@ impl Carrier {
 
     /// Joints that have the body at a pose in the world, near to the robot's ready pose.
     pub(super) fn joints_at(&self, body: &Isometry3<f64>) -> Option<Joints> {
-        self.model.reach(self.model.ready(), &self.flange_from_body, &(self.base_from_world * body))
+        self.model.reach(self.model.ready(), &self.flange_from_body, &(self.base_from_world * body), None)
     }
 
     /// The flange in the arm's base with which the carried body is at a pose in the world.
@@ -135,7 +135,7 @@ impl Carrier {
     ) {
         let target = self.base_from_world * now;
         let from = command.q.unwrap_or(*self.model.ready());
-        let Some(q) = self.model.reach(&from, &self.flange_from_body, &target) else {
+        let Some(q) = self.model.reach(&from, &self.flange_from_body, &target, None) else {
             let [x, y, z] = target.translation.vector.into();
             let at = format!("({x:.3}, {y:.3}, {z:.3}) m");
             command.fault.get_or_insert_with(|| format!("it does not reach {at} at {time:.2} s"));

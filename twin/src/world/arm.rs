@@ -80,7 +80,9 @@ impl Arm {
     /// The same by the pose that the body is to have within a step; `false` where the arm does not reach it.
     pub(super) fn aim_at(&mut self, body: &Isometry3<f64>, dt: f64) -> bool {
         let target = self.plan.base.inverse() * body;
-        let Some(q) = self.plan.model.reach(&self.q_d, &self.plan.flange_from_body, &target) else { return false };
+        let Some(q) = self.plan.model.reach(&self.q_d, &self.plan.flange_from_body, &target, None) else {
+            return false;
+        };
         let mut dq = [0.0; MAX_JOINTS];
         (0..self.dof()).for_each(|i| dq[i] = (q[i] - self.q_d[i]) / dt);
         self.aim(q, dq);

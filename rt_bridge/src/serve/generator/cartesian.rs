@@ -5,16 +5,15 @@
 //! refuses, it refuses there.
 
 use super::Surroundings;
-use super::inverse::solve;
 use super::rules::{FOLLOWING, JointRules, check_end_effector, check_end_effector_end, exceeds};
 use crate::safety::Trace;
 use crate::serve::faults::{Fault, Verdict};
-use crate::serve::kinematics::{ELBOW, difference, elbow};
+use crate::serve::kinematics::{ELBOW, elbow};
 use crate::serve::settings::isometry;
 use crate::serve::wire::SetPoint;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use shared_mem::time::TICK;
-use twin::arm::Joints;
+use twin::arm::{Joints, pose_difference};
 
 /// How far from the arm's desired pose a motion may begin [m, rad], and from its elbow [rad]. The robot's own
 /// tolerances are not published.
@@ -77,8 +76,8 @@ impl CartesianGenerator {
         }
         let jerk = (next.acceleration - self.trace.acceleration) / TICK;
         check_end_effector(&next.twist, &next.acceleration, &jerk)?;
-        let q = solve(&around.ee, &self.joints.q, &next.pose, joint_3)
-            .ok_or(Fault::CartesianJointVelocityLimits.alone())?;
+        let q =
+            around.ee.reach(&self.joints.q, &next.pose, joint_3).ok_or(Fault::CartesianJointVelocityLimits.alone())?;
         let joints = self.joints.after(&q, TICK);
         around.rules.check(&self.joints, &joints, &FOLLOWING)?;
         (self.begun, self.trace, self.joints) = (true, next, joints);
@@ -95,7 +94,7 @@ impl CartesianGenerator {
     }
 
     fn check_start(&self, set_point: &SetPoint, pose: &Isometry3<f64>) -> Verdict {
-        let miss = difference(&self.trace.pose, pose);
+        let miss = pose_difference(&self.trace.pose, pose);
         let [way, turn] = START;
         if exceeds(miss.fixed_rows::<3>(0).norm(), way) || exceeds(miss.fixed_rows::<3>(3).norm(), turn) {
             return Err(Fault::CartesianStartPose.alone());
@@ -114,7 +113,7 @@ impl CartesianGenerator {
         let twist = twist + acceleration * TICK;
         let pose = moved(&pose, &twist);
         self.trace = CartesianTrace { pose, twist, acceleration };
-        self.joints = match solve(&around.ee, &self.joints.q, &pose, None) {
+        self.joints = match around.ee.reach(&self.joints.q, &pose, None) {
             Some(q) => self.joints.after(&q, TICK),
             None => self.joints.onward(TICK),
         };
@@ -129,7 +128,7 @@ impl CartesianGenerator {
 impl CartesianTrace {
     /// The trace after `pose` was commanded.
     fn to(&self, pose: &Isometry3<f64>) -> Self {
-        let twist = difference(&self.pose, pose) / TICK;
+        let twist = pose_difference(&self.pose, pose) / TICK;
         Self { pose: *pose, twist, acceleration: (twist - self.twist) / TICK }
     }
 }

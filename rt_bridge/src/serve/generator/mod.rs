@@ -7,11 +7,9 @@
 //! | [`joint`] | joint positions and joint velocities |
 //! | [`targets`] | sparse targets of the joints, which the robot plans to |
 //! | [`cartesian`] | poses and twists of the end effector, with or without elbow |
-//! | [`inverse`] | the joint positions of a pose |
 //! | [`rules`] | how fast joints and end effector may go and change |
 
 pub(super) mod cartesian;
-mod inverse;
 pub(super) mod joint;
 pub(super) mod rules;
 mod targets;
