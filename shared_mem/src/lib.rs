@@ -59,6 +59,7 @@ pub mod printable;
 pub mod progress;
 pub mod quantity;
 pub mod recording;
+pub mod statistics;
 pub mod theta;
 pub mod time;
 pub mod toml_file;

@@ -9,6 +9,7 @@ use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::console;
 use shared_mem::msg::object::{NamedPose, ObjectName, ObjectPose};
+use shared_mem::statistics::median;
 use shared_mem::topics::{OBJECT_POSE, OBJECT_POSES};
 use shared_mem::transport::{Node, Subscriber, TransportError};
 use std::time::{Duration, Instant};
@@ -317,9 +318,8 @@ fn still(seen: &[Seen]) -> Option<Standing> {
 
 fn quality(seen: &[Seen]) -> PoseQuality {
     let (Some(first), Some(last)) = (seen.first(), seen.last()) else { return PoseQuality::default() };
-    let mut gaps: Vec<f64> = seen.windows(2).map(|w| w[1].time - w[0].time).collect();
-    gaps.sort_unstable_by(f64::total_cmp);
-    let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
+    let gaps: Vec<f64> = seen.windows(2).map(|w| w[1].time - w[0].time).collect();
+    let usual = median(gaps.iter().copied()).unwrap_or(0.0);
     let lost = |gap: &f64| if *gap > MISSING * usual && usual > 0.0 { (gap / usual).round() as usize - 1 } else { 0 };
     PoseQuality {
         poses: seen.len(),

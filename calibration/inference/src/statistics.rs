@@ -1,4 +1,6 @@
-//! Numbers of many values, and quantiles of distributions: the one place of each.
+//! Quantiles of distributions, the one place of each; medians are those of [`shared_mem::statistics`].
+
+pub use shared_mem::statistics::median;
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, Normal, StudentsT};
 
@@ -23,19 +25,6 @@ pub fn beyond_f(value: f64, above: usize, below: usize) -> f64 {
     FisherSnedecor::new(above as f64, below as f64).map_or(1.0, |f| f.sf(value))
 }
 
-/// The middle value, of two the mean; `None` of none. Values that are no numbers count as the largest.
-pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return None;
-    }
-    let even = values.len().is_multiple_of(2);
-    let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    let lower = below.iter().copied().max_by(f64::total_cmp).filter(|_| even);
-    Some(lower.map_or(*upper, |lower| 0.5 * (lower + *upper)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -49,12 +38,5 @@ mod tests {
         assert!((student_sigmas(normal(0.95), 4) - student(0.95, 4)).abs() < 1e-9);
         assert!((student(0.9, 10) - 1.8125).abs() < 1e-3 && student(0.9, 0).is_infinite());
         assert!((beyond_f(3.2172, 6, 10) - 0.05).abs() < 1e-3 && beyond_f(1.0, 6, 0) == 1.0);
-    }
-
-    #[test]
-    fn the_median_lies_in_the_middle() {
-        assert_eq!(median([3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median([4.0, 1.0, 3.0, 2.0]), Some(2.5));
-        assert_eq!(median([]), None);
     }
 }

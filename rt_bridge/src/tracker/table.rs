@@ -4,6 +4,7 @@
 
 use super::view::{Frame, View};
 use nalgebra::{Matrix3, Vector3};
+use shared_mem::statistics::robust_sigma;
 
 /// Every so many pixels along rows and columns one is asked.
 const EVERY: usize = 8;
@@ -100,9 +101,7 @@ impl Table {
 
 /// Median of the residuals' size, as one sigma.
 fn spread(samples: &[(Vector3<f32>, f32)], normal: &Vector3<f32>) -> f32 {
-    let mut sizes: Vec<f32> = samples.iter().map(|(ray, seen)| (seen - normal.dot(ray)).abs()).collect();
-    let middle = sizes.len() / 2;
-    1.4826 * *sizes.select_nth_unstable_by(middle, f32::total_cmp).1
+    robust_sigma(samples.iter().map(|(ray, seen)| f64::from(seen - normal.dot(ray)))).unwrap_or(0.0) as f32
 }
 
 /// Least squares over the samples within `reach` of the plane so far.

@@ -4,6 +4,7 @@
 use crate::log::{Column, LeftOut, Log, Table};
 use crate::naming;
 use crate::windows;
+use shared_mem::statistics::median;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What runs are called, where they are numbered.
@@ -131,9 +132,7 @@ fn by_stamps(mut log: Log) -> Vec<Log> {
 fn begins(stamps: &[f64]) -> Option<Vec<usize>> {
     let first = *stamps.first()?;
     let falls: Vec<usize> = (1..stamps.len()).filter(|row| stamps[*row] < stamps[row - 1]).collect();
-    let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    let near = NEAR_STEPS * steps.get(steps.len() / 2)?;
+    let near = NEAR_STEPS * median(stamps.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0))?;
     let begins: Vec<usize> = std::iter::once(0).chain(falls).collect();
     let ends = begins.iter().skip(1).copied().chain([stamps.len()]);
     let is_long = begins.iter().zip(ends).all(|(begin, end)| end - begin >= FEWEST_ROWS);

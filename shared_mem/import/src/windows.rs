@@ -3,6 +3,7 @@
 use crate::log::{Column, LeftOut, Log, Table};
 use crate::naming::{self, Group};
 use shared_mem::msg::MAX_JOINTS;
+use shared_mem::statistics::median;
 
 /// More columns than any arm has joints; only those may be a motion in each row.
 const WIDE: usize = 16;
@@ -80,9 +81,7 @@ fn length(table: &Table) -> Option<usize> {
 /// Whether rows go on like a motion over time: many columns, each near the one beside it and far from itself one row on.
 fn is_motion(columns: &[&[f64]]) -> bool {
     let middle = |pairs: &mut dyn Iterator<Item = (f64, f64)>| {
-        let mut differences: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).collect();
-        differences.sort_by(f64::total_cmp);
-        differences.get(differences.len() / 2).copied()
+        median(pairs.map(|(a, b)| (a - b).abs()).filter(|difference| difference.is_finite()))
     };
     if columns.len() < WIDE {
         return false;

@@ -4,6 +4,7 @@ use crate::remark::Remark;
 use crate::scan::{Frame, Scan, ScanError};
 use rayon::prelude::*;
 use shared_mem::ending;
+use shared_mem::statistics::{median, robust_sigma};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Every so many views one is held out.
@@ -47,9 +48,7 @@ pub(crate) fn named(frames: &[Frame]) -> String {
 /// The frames without those that have far less detail than the others.
 pub(crate) fn without_blurred(frames: Vec<Frame>, remarks: &mut Vec<Remark>) -> Vec<Frame> {
     let detail: Vec<f64> = frames.par_iter().map(detail).collect();
-    let mut sorted = detail.clone();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let middle = median(detail.iter().copied()).unwrap_or(0.0);
     let mut blurred = Vec::new();
     let mut kept = Vec::new();
     for (frame, detail) in frames.into_iter().zip(detail) {
@@ -99,7 +98,5 @@ pub(crate) fn spread(frames: &[Frame]) -> Option<f64> {
     if off.len() < 100 {
         return None;
     }
-    off.sort_by(f64::total_cmp);
-    // The middle of absolute normal values.
-    Some((off[off.len() / 2] / 0.6745).clamp(2e-4, 0.05))
+    robust_sigma(off).map(|sigma| sigma.clamp(2e-4, 0.05))
 }

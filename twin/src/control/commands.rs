@@ -3,6 +3,7 @@
 use crate::arm::{Joints, MAX_JOINTS};
 use shared_mem::msg::joints_from;
 use shared_mem::recording::JointSeries;
+use shared_mem::statistics::usual_step_ns;
 use shared_mem::time::TICK_NS;
 
 /// A log at most this far apart is the control loop's own: a missing row was lost on its way to the log, not to the
@@ -53,9 +54,7 @@ impl CommandTrack {
     }
 
     fn filled(self) -> Self {
-        let mut steps: Vec<u64> = self.stamps_ns.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.sort_unstable();
-        let Some(&usual) = steps.get(steps.len() / 2) else { return self };
+        let Some(usual) = usual_step_ns(&self.stamps_ns) else { return self };
         let mut out = Self { stamps_ns: Vec::new(), q_d: Vec::new(), dq_d: Vec::new(), holes: Vec::new() };
         for row in 0..self.stamps_ns.len() {
             out.push(self.stamps_ns[row], self.q_d[row], self.dq_d[row]);

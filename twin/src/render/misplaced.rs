@@ -2,6 +2,7 @@
 
 use super::{RobotSurface, ScannedLink};
 use nalgebra::{Isometry3, Point3, Vector3};
+use shared_mem::statistics::median;
 
 /// Splats fainter than this are haze and say nothing of a surface.
 const FAINT: f32 = 0.3;
@@ -26,13 +27,12 @@ fn remark(robot: &RobotSurface, scan: &ScannedLink, in_base: bool) -> Option<Str
         let nearest = at.coords.sup(&low.coords).inf(&high.coords);
         (at.coords - nearest).norm()
     });
-    let mut away: Vec<f64> = away.collect();
+    let away: Vec<f64> = away.collect();
     let elsewhere = away.iter().filter(|distance| **distance > around).count();
-    if away.is_empty() || (elsewhere as f64) < MANY * away.len() as f64 {
+    let middle = median(away.iter().copied())?;
+    if (elsewhere as f64) < MANY * away.len() as f64 {
         return None;
     }
-    away.sort_unstable_by(f64::total_cmp);
-    let middle = away[away.len() / 2];
     let remedy = if in_base {
         "give the joint positions of the scan with --scanned-at"
     } else {

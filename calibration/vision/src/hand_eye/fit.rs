@@ -9,6 +9,7 @@ use super::view::View;
 use inference::statistics;
 use nalgebra::{Isometry3, Matrix6, SMatrix, Vector3};
 use shared_mem::hand_eye::Mount;
+use shared_mem::statistics::median;
 
 /// Mount and board from a set of pictures.
 #[derive(Debug, Clone)]
@@ -102,9 +103,7 @@ pub fn fit(mount: Mount, views: &[View]) -> Result<Fit, NoFit> {
     if usable < FEWEST {
         return Err(NoFit::Few(usable));
     }
-    let mut sigmas: Vec<f64> = alone.iter().flatten().map(|(_, sigma)| *sigma).collect();
-    sigmas.sort_by(f64::total_cmp);
-    let rough = sigmas[sigmas.len() / 2].max(1e-6);
+    let rough = median(alone.iter().flatten().map(|(_, sigma)| *sigma)).map_or(1e-6, |sigma| sigma.max(1e-6));
     let pairs = views.iter().zip(&alone).filter_map(|(view, alone)| alone.map(|(board, _)| (view, board)));
     let mut prepared: Vec<Prepared<'_>> = pairs.map(|(view, board)| Prepared::new(view, mount, board)).collect();
     for picture in &mut prepared {

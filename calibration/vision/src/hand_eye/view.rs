@@ -3,6 +3,7 @@
 use crate::viewpoint::lens::Lens;
 use crate::viewpoint::planar::{self, Seen};
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use shared_mem::statistics::median;
 
 /// A picture of the board.
 #[derive(Debug, Clone)]
@@ -87,11 +88,9 @@ impl View {
         let mut pose = planar::pose(&self.seen, &self.lens)?;
         let mut sigma = f64::INFINITY;
         for _ in 0..ROUNDS {
-            let mut off = self.residuals(&pose);
-            off.sort_by(f64::total_cmp);
             // Six numbers of the pose have been fitted.
-            let free = 1.0 - 3.0 / off.len() as f64;
-            sigma = off[off.len() / 2] / MEDIAN_LENGTH / free.sqrt();
+            let free = 1.0 - 3.0 / self.seen.len() as f64;
+            sigma = median(self.residuals(&pose))? / MEDIAN_LENGTH / free.sqrt();
             let weights = self.weights(&pose, sigma.max(1e-9));
             let Equations { gradient, information } = self.equations(&pose, &weights)?;
             pose = moved(&pose, &-information.cholesky()?.solve(&gradient));

@@ -19,6 +19,7 @@ use shared_mem::input;
 use shared_mem::lens::calibration::Calibration;
 use shared_mem::output::Destination;
 use shared_mem::recording::{PictureKind, Session, write_png_to};
+use shared_mem::statistics::median;
 use shared_mem::toml_file;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -410,11 +411,9 @@ fn answer(
     };
     let start = start.map(|start| {
         let (distance_m, angle_rad) = step::apart(start, &found.camera_from_base);
-        let mut off: Vec<f64> = (frames.iter())
+        let off = (frames.iter())
             .flat_map(|frame| joints(frame, start).into_iter().zip(joints(frame, &found.camera_from_base)))
-            .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
-            .collect();
-        off.sort_by(f64::total_cmp);
+            .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
         let (from, to) = (pose(start), pose(&found.camera_from_base));
         let excluded = found
             .interval
@@ -423,7 +422,7 @@ fn answer(
             camera: from,
             distance_m,
             angle_rad,
-            reprojection_px: off.get(off.len() / 2).copied().unwrap_or(f64::MAX),
+            reprojection_px: median(off).unwrap_or(f64::MAX),
             confirmed: refine::at(frames, shape, start).map_or(0.0, |there| 1.0 - there.cost),
             excluded,
         }

@@ -10,6 +10,7 @@ use super::shape::Shape;
 use super::step::moved;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use shared_mem::ending;
+use shared_mem::statistics::median;
 use std::ops::Range;
 
 /// A pose and what the pictures say there.
@@ -91,7 +92,7 @@ pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Ra
         let mut here = work.at(&from)?;
         if stage.exact {
             // Whatever cuts or adds to a silhouette then weighs little against what it shows exactly.
-            let typical = median(&mut work.offsets).unwrap_or(0.0);
+            let typical = median(work.offsets.iter().copied()).unwrap_or(0.0);
             work.half = (OUTLIERS * typical).clamp(FINEST_HALF, stage.half);
             here = work.at(&from)?;
         }
@@ -172,11 +173,6 @@ fn solve(information: &Matrix6<f64>, gradient: &Vector6<f64>, damping: f64) -> O
 /// At the last stage an offset counts half at this multiple of the usual one, but not below that [pixel].
 const OUTLIERS: f64 = 3.0;
 const FINEST_HALF: f64 = 0.2;
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len().checked_sub(1)? / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
 
 /// Draws and compares at one stage.
 struct Work<'a> {

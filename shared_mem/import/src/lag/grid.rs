@@ -1,6 +1,7 @@
 //! Velocities of two motions on one even grid of time, as lags are told from. Single rows that jump away and back are no motion.
 
 use super::Motion;
+use shared_mem::statistics::median;
 
 /// Most samples of a motion: longer ones are sampled more coarsely. Finest time between samples [s].
 const SAMPLES: f64 = 4000.0;
@@ -83,9 +84,7 @@ impl Grid {
 
 /// The usual time between rows [s]; 0 of fewer than two.
 pub fn usual_step(t: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+    median(t.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0)).unwrap_or(0.0)
 }
 
 /// Positions whose single rows that jump away and back are put between their neighbours.

@@ -6,6 +6,7 @@ use super::track::Track;
 use crate::log::{Column, HEADER, Log, Table};
 use crate::mapping::{JointColumns, TimeUnit};
 use crate::naming;
+use shared_mem::statistics::median;
 
 /// Rows of a robot's log come between these rates [Hz]; a thousand apart, so that one unit alone fits.
 const SLOWEST: f64 = 4.0;
@@ -134,9 +135,8 @@ fn repeated(column: &Column) -> Option<usize> {
 /// stands among joints.
 fn ticking(table: &Table) -> Option<&Column> {
     let ticks = |column: &&Column| {
-        let mut steps: Vec<f64> = column.values.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        let middle = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+        let steps: Vec<f64> = column.values.windows(2).map(|w| w[1] - w[0]).collect();
+        let middle = median(steps.iter().copied()).unwrap_or(0.0);
         let equal = steps.iter().filter(|step| (*step - middle).abs() < SAME_STEP * middle).count();
         let counts = middle == 1.0 && steps.iter().all(|step| step.fract() == 0.0);
         steps.len() >= FEWEST_STEPS
@@ -164,9 +164,7 @@ fn unit(log: &Log, name: &str, values: &[f64]) -> (TimeUnit, String) {
     if let Some(unit) = naming::time_unit(name).and_then(of) {
         return (unit, format!("`{name}` names its unit"));
     }
-    let mut steps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    let step = steps.get(steps.len() / 2).copied().unwrap_or(f64::NAN);
+    let step = median(values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0)).unwrap_or(f64::NAN);
     // As many digits as a person reads: differences of decimal numbers end in rounding.
     let step = format!("{step:.5e}").parse().unwrap_or(step);
     let fits = |(unit, _): &&(TimeUnit, &str)| (SLOWEST..FASTEST).contains(&(1.0 / (step * unit.seconds())));

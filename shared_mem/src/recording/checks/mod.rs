@@ -13,6 +13,7 @@ pub(super) use outlying::find as outlying_rows;
 pub(super) use wraps::same_turn;
 
 use super::series::JointSeries;
+use crate::statistics::median;
 
 /// Largest share of rows that may be left out before reading fails; one may be in any case, of this many and more.
 const LARGEST_BAD_SHARE: f64 = 0.01;
@@ -196,9 +197,7 @@ fn interleaved(series: &JointSeries, topic: &str) -> Option<String> {
 /// Samples that did not arrive, by the stamps of those that did.
 pub(super) fn gaps(stamps_ns: &[u64], topic: &str) -> Option<String> {
     let steps: Vec<u64> = stamps_ns.windows(2).filter_map(|w| w.last()?.checked_sub(*w.first()?)).collect();
-    let mut sorted = steps.clone();
-    sorted.sort_unstable();
-    let usual = sorted.get(sorted.len() / 2).copied().filter(|s| *s > 0)? as f64;
+    let usual = median(steps.iter().map(|step| *step as f64)).filter(|usual| *usual > 0.0)?;
     let is_gap = |step: u64| step as f64 > 1.8 * usual;
     let count = steps.iter().filter(|s| is_gap(**s)).count();
     let (row, longest) = steps.iter().enumerate().max_by_key(|(_, s)| **s)?;

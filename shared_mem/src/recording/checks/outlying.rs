@@ -2,6 +2,7 @@
 //! clock that was set while it stamped. Left in, they would make a clip of seconds one of days, all of which would have to
 //! be simulated.
 
+use crate::statistics::usual_step_ns;
 use crate::time::seconds_between;
 
 /// A few rows that are so far away from the others [ns], and by so many usual steps as are a hole in commands, were stamped
@@ -33,11 +34,10 @@ pub(in super::super) struct Outlying {
 pub(in super::super) fn find(stamps_ns: &[u64], topic: &str) -> Result<Option<Outlying>, String> {
     let mut sorted = stamps_ns.to_vec();
     sorted.sort_unstable();
-    let mut steps: Vec<u64> = sorted.windows(2).map(|w| w.last().unwrap_or(&0) - w.first().unwrap_or(&0)).collect();
-    steps.sort_unstable();
-    let Some(usual) = steps.get(steps.len() / 2) else { return Ok(None) };
+    let Some(usual) = usual_step_ns(&sorted) else { return Ok(None) };
     let apart = usual.saturating_mul(APART_STEPS).max(APART_NS);
-    if steps.last().is_none_or(|longest| *longest <= apart.min(LONGEST_PAUSE_NS)) {
+    let longest = sorted.iter().zip(sorted.iter().skip(1)).map(|(a, b)| b - a).max();
+    if longest.is_none_or(|longest| longest <= apart.min(LONGEST_PAUSE_NS)) {
         return Ok(None);
     }
     let total = stamps_ns.len();

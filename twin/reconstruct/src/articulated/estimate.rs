@@ -9,6 +9,7 @@ use super::{ArticulatedError, go_on};
 use nalgebra::{DMatrix, Isometry3, Point3, Translation3, Vector3};
 use rayon::prelude::*;
 use shared_mem::progress::Progress;
+use shared_mem::statistics::robust_sigma;
 
 /// Poses of the whole that are looked at, and poses of a part for each.
 const WHOLES: usize = 5;
@@ -165,12 +166,9 @@ fn residuals(pair: &Pair<'_>, poses: &[Isometry3<f64>; 2], points: &Points<'_>, 
     all
 }
 
-/// Standard deviation out of the median of absolute residuals [m].
+/// Standard deviation of the residuals [m].
 fn noise(pair: &Pair<'_>, motion: &Motion, points: &Points<'_>, tolerance: f64) -> f64 {
-    let mut sizes: Vec<f64> =
-        residuals(pair, &motion.poses(), points, tolerance).into_iter().map(|(_, r)| r.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    1.4826 * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0)
+    robust_sigma(residuals(pair, &motion.poses(), points, tolerance).into_iter().map(|(_, r)| r)).unwrap_or(0.0)
 }
 
 /// The joint with all points, as both kinds.

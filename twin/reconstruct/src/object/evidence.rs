@@ -9,6 +9,7 @@ use crate::mesh::Mesh;
 use crate::scan::{Camera, Frame};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
+use shared_mem::statistics::median;
 
 /// Pictures of fewer pixels do.
 const COARSER: u32 = 3;
@@ -39,7 +40,7 @@ impl Evidence {
                 colours[corner].extend(pixel.and_then(|pixel| mean(frame, pixel, COARSER)));
             }
         }
-        let apart = Neighbours::of(mesh).smoothed(colours.iter_mut().map(|colours| apart(colours)).collect());
+        let apart = Neighbours::of(mesh).smoothed(colours.iter().map(|colours| apart(colours)).collect());
         Self { views, contradicted: apart.into_iter().map(|apart| apart.is_some_and(|apart| apart > APART)).collect() }
     }
 
@@ -114,14 +115,13 @@ pub(super) fn mean(frame: &Frame, [column, row]: [usize; 2], by: u32) -> Option<
 }
 
 /// Mean distance of colours from their middle one, channel by channel.
-fn apart(colours: &mut [[f64; 3]]) -> Option<f64> {
+fn apart(colours: &[[f64; 3]]) -> Option<f64> {
     if colours.len() < FEWEST {
         return None;
     }
     let mut sum = 0.0;
     for c in 0..3 {
-        colours.sort_by(|a, b| a[c].total_cmp(&b[c]));
-        let middle = colours[colours.len() / 2][c];
+        let middle = median(colours.iter().map(|colour| colour[c]))?;
         sum += colours.iter().map(|colour| (colour[c] - middle).abs()).sum::<f64>();
     }
     Some(sum / (3 * colours.len()) as f64)

@@ -11,6 +11,7 @@ use crate::remark::Remark;
 use crate::scan::Frame;
 use crate::splats;
 use rayon::prelude::*;
+use shared_mem::statistics::median;
 use splat::SplatCloud;
 
 /// So near to the mask's border pixels do not count: what is behind shines in [pixel].
@@ -95,9 +96,8 @@ pub(super) fn depth_scale(grid: &Grid, distance: &[f32], frames: &[Frame]) -> Op
         };
         (0..drawn.depth.len()).filter_map(ratio).collect()
     };
-    let mut ratios: Vec<f64> = frames.par_iter().flat_map_iter(of).collect();
-    ratios.sort_by(f64::total_cmp);
-    (ratios.len() > 100).then(|| ratios[ratios.len() / 2])
+    let ratios: Vec<f64> = frames.par_iter().flat_map_iter(of).collect();
+    if ratios.len() > 100 { median(ratios) } else { None }
 }
 
 /// What a person should know about the surface.

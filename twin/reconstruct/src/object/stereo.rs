@@ -220,13 +220,12 @@ mod tests {
     use super::super::evidence::tests::{body, scan};
     use super::*;
     use crate::mesh::surface;
+    use shared_mem::statistics::median;
 
     /// Middle depth [step] of the corners for which it counts.
     fn middle(depths: &[f64], mesh: &Mesh, counts: impl Fn(&Point3<f64>) -> bool) -> f64 {
-        let mut depths: Vec<f64> =
-            depths.iter().zip(&mesh.points).filter(|(_, p)| counts(p)).map(|(depth, _)| *depth).collect();
-        depths.sort_by(f64::total_cmp);
-        depths[depths.len() / 2]
+        let counted = depths.iter().zip(&mesh.points).filter(|(_, p)| counts(p)).map(|(depth, _)| *depth);
+        median(counted).expect("corners")
     }
 
     #[test]

@@ -5,6 +5,7 @@ use crate::scan::Frame;
 use crate::splats;
 use fusion::Surface;
 use fusion::plane::Level;
+use shared_mem::statistics::median;
 use splat::{Mesh, SplatCloud};
 
 /// Colour of the surface in pictures.
@@ -48,8 +49,8 @@ pub(super) fn held_out(
     let drawn = splats::draw(cloud, &frame.camera, pose, background);
     let surface = splats::draw_mesh(looks, &frame.camera, pose);
     let measured = || frame.depth.iter().zip(&surface.depth).filter(|(measured, _)| **measured > 0.0);
-    let mut offs: Vec<f32> = measured().filter(|(_, z)| **z > 0.0).map(|(a, b)| (a - b).abs()).collect();
-    offs.sort_by(f32::total_cmp);
+    let offs: Vec<f64> = measured().filter(|(_, z)| **z > 0.0).map(|(a, b)| f64::from((a - b).abs())).collect();
+    let compared = offs.len();
     let picture: Vec<[u8; 3]> = drawn.rgb8().collect();
     HeldOut {
         name: frame.name.clone(),
@@ -60,8 +61,8 @@ pub(super) fn held_out(
         splats: picture,
         splat_depth: if planar { splats::plane_depth(cloud, &frame.camera, pose) } else { drawn.depth },
         surface: surface.rgb8().collect(),
-        depth_off: offs.get(offs.len() / 2).map_or(0.0, |off| f64::from(*off)),
-        covered: offs.len() as f64 / measured().count().max(1) as f64,
+        depth_off: median(offs).unwrap_or(0.0),
+        covered: compared as f64 / measured().count().max(1) as f64,
     }
 }
 
