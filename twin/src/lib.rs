@@ -7,6 +7,7 @@ pub mod description;
 pub mod effects;
 pub mod metrics;
 pub mod physics;
+pub mod pose_fit;
 pub mod reconstruct;
 pub mod render;
 pub mod replay;

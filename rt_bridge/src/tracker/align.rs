@@ -1,12 +1,13 @@
 //! From a pose that is nearly right to the one that fits best: Gauss and Newton's steps over depth, outline and contact
-//! with the table, in the camera's frame. A step is a shift of the object's centre and a turn about it.
+//! with the table, in the camera's frame, in steps about the object's centre.
 
 use super::colors::Colors;
 use super::contour::{self, Crossing};
 use super::model::Model;
 use super::patch::Patch;
 use super::table::Table;
-use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use twin::pose_fit::{Equations, moved, pixel_direction, slope};
 
 /// Pixels whose depth is compared, at most.
 const PIXELS: usize = 4000;
@@ -36,7 +37,7 @@ pub(super) const FINE: Schedule =
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fit {
     pub(super) camera_from_object: Isometry3<f64>,
-    /// Inverse of the covariance of centre and small turn, camera axes.
+    /// Inverse of the covariance of small turn and centre, camera axes.
     pub(super) information: Matrix6<f64>,
 }
 
@@ -46,21 +47,6 @@ pub(super) struct Scene<'a> {
     pub(super) model: &'a Model,
     pub(super) table: &'a Table,
     pub(super) colors: &'a Colors,
-}
-
-/// Normal equations under way.
-struct Equations {
-    information: Matrix6<f64>,
-    right: Vector6<f64>,
-}
-
-impl Equations {
-    /// One measurement: it changes by `row . step`, is off by `residual`, and counts `weight`.
-    #[inline]
-    fn add(&mut self, row: &Vector6<f64>, residual: f64, weight: f64) {
-        self.information.ger(weight, row, row, 1.0);
-        self.right.axpy(weight * residual, row, 1.0);
-    }
 }
 
 impl Scene<'_> {
@@ -77,8 +63,8 @@ impl Scene<'_> {
             }
             self.contact(&pose, &mut equations);
             information = equations.information;
-            let step = information.cholesky()?.solve(&equations.right);
-            pose = moved(&pose, &step);
+            let step = equations.step(0.0, 0.0)?;
+            pose = moved(&pose, &pose.translation.vector.into(), &step);
             if step.amax() < STILL {
                 break;
             }
@@ -88,7 +74,7 @@ impl Scene<'_> {
 
     /// Measured against drawn inverse depth, pixel by pixel. A surface through `P` with normal `N`, `N . P = 1`, is seen at
     /// inverse depth `N . ray`, which changes by `-(N . ray) N . v` when its point moves by `v`.
-    fn depth(&self, patch: &Patch, pose: &Isometry3<f64>, gate: f32, equations: &mut Equations) {
+    fn depth(&self, patch: &Patch, pose: &Isometry3<f64>, gate: f32, equations: &mut Equations<6>) {
         let (drawn, width) = (patch.drawn(), patch.width);
         let count = drawn.iter().filter(|d| **d > 0.0).count();
         let every = ((count as f64 / PIXELS as f64).sqrt().ceil() as usize).max(1);
@@ -113,15 +99,15 @@ impl Scene<'_> {
                 let weight = (1.0 - share * share).powi(2) / (sigma * sigma);
                 let m = f64::from(m);
                 let arm = patch.ray(u, v).cast::<f64>() / m - centre;
-                let row = rigid(&(normal * -m), &arm);
-                equations.add(&row, f64::from(residual), f64::from(weight) / shared.max(1.0));
+                let row = slope(&(normal * -m), &arm);
+                equations.add(&row, -f64::from(residual), f64::from(weight) / shared.max(1.0));
             }
         }
     }
 
     /// The corners nearest to the table lie on it. One that is higher than a few millimetres is lifted and counts no more;
     /// none lies below.
-    fn contact(&self, pose: &Isometry3<f64>, equations: &mut Equations) {
+    fn contact(&self, pose: &Isometry3<f64>, equations: &mut Equations<6>) {
         let up = self.table.up();
         let mut touching = 0.0;
         let rows: Vec<_> = self
@@ -134,43 +120,34 @@ impl Scene<'_> {
                 let lifted = (height / LIFTED).max(0.0);
                 let counts = (1.0 + lifted * lifted).powi(-2);
                 touching += counts;
-                (rigid(&up, &arm), height, counts)
+                (slope(&up, &arm), height, counts)
             })
             .collect();
         let share = 1.0 / (CONTACT * CONTACT) / (touching / 4.0_f64).max(1.0);
         for (row, height, counts) in rows {
-            equations.add(&row, -height, share * counts);
+            equations.add(&row, height, share * counts);
         }
     }
 }
 
-/// How `direction . v` changes with a step, for a point at `arm` from the object's centre.
-#[inline]
-fn rigid(direction: &Vector3<f64>, arm: &Vector3<f64>) -> Vector6<f64> {
-    let turn = arm.cross(direction);
-    Vector6::new(direction.x, direction.y, direction.z, turn.x, turn.y, turn.z)
-}
-
 /// What is known beside the picture: not far from where the fit began.
-fn expected(start: &Isometry3<f64>, pose: &Isometry3<f64>) -> Equations {
+fn expected(start: &Isometry3<f64>, pose: &Isometry3<f64>) -> Equations<6> {
     let [place, turn] = EXPECTED.map(|sigma| 1.0 / (sigma * sigma));
-    let information = Matrix6::from_diagonal(&Vector6::new(place, place, place, turn, turn, turn));
-    let shift = start.translation.vector - pose.translation.vector;
-    let back = (start.rotation * pose.rotation.inverse()).scaled_axis();
-    let off = Vector6::new(shift.x, shift.y, shift.z, back.x, back.y, back.z);
-    Equations { information, right: information * off }
+    let information = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, place, place, place));
+    let shift = pose.translation.vector - start.translation.vector;
+    let turned = (pose.rotation * start.rotation.inverse()).scaled_axis();
+    let off = Vector6::new(turned.x, turned.y, turned.z, shift.x, shift.y, shift.z);
+    Equations { information, gradient: information * off }
 }
 
 /// One line across the outline.
-fn outline([fx, fy]: [f32; 2], crossing: &Crossing, pose: &Isometry3<f64>, equations: &mut Equations) {
+fn outline([fx, fy]: [f32; 2], crossing: &Crossing, pose: &Isometry3<f64>, equations: &mut Equations<6>) {
     let Crossing { point, normal, off, variance } = crossing;
-    let (nx, ny) = (normal.x * f64::from(fx) / point.z, normal.y * f64::from(fy) / point.z);
-    // Along the picture's normal a point moves by this direction . v pixels.
-    let direction = Vector3::new(nx, ny, -(nx * point.x + ny * point.y) / point.z);
-    let row = rigid(&direction, &(point - pose.translation.vector));
+    let direction = pixel_direction(&Point3::from(*point), [fx, fy].map(f64::from), [normal.x, normal.y]);
+    let row = slope(&direction, &(point - pose.translation.vector));
     // Huber: beyond two pixels a line pulls no harder.
     let robust = (2.0 / off.abs().max(1e-9)).min(1.0);
-    equations.add(&row, *off, robust / variance / SHARED_LINES);
+    equations.add(&row, -off, robust / variance / SHARED_LINES);
 }
 
 /// `N` of the drawn surface at a pixel, from how its inverse depth changes; `None` at edges.
@@ -187,11 +164,4 @@ fn normal_at(patch: &Patch, u: usize, v: usize) -> Option<Vector3<f64>> {
     let ny = slope(drawn[at - width], drawn[at + width])? * fy;
     let ray = patch.ray(u, v).cast::<f64>();
     Some(Vector3::new(nx, ny, f64::from(here) - nx * ray.x - ny * ray.y))
-}
-
-/// A pose after a step.
-fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
-    let shift = Vector3::new(step[0], step[1], step[2]);
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5]));
-    Isometry3::from_parts(Translation3::from(pose.translation.vector + shift), turn * pose.rotation)
 }

@@ -350,8 +350,9 @@ impl Seen {
 fn covariance(view: &View, information: &Matrix6<f64>, unseen: Option<Vector3<f64>>) -> [f64; 36] {
     let turn = view.base_from_camera.rotation.to_rotation_matrix();
     let mut axes = Matrix6::zeros();
-    axes.fixed_view_mut::<3, 3>(0, 0).copy_from(turn.matrix());
-    axes.fixed_view_mut::<3, 3>(3, 3).copy_from(turn.matrix());
+    // Of the information the turn comes first, of the covariance the centre.
+    axes.fixed_view_mut::<3, 3>(0, 3).copy_from(turn.matrix());
+    axes.fixed_view_mut::<3, 3>(3, 0).copy_from(turn.matrix());
     // Never singular: what the picture leaves open is bounded by what is expected beside it.
     let inverse = information.try_inverse().unwrap_or_else(Matrix6::identity);
     let mut covariance = axes * inverse * axes.transpose();

@@ -5,7 +5,8 @@
 
 use super::nearest::Nearest;
 use super::surface::SurfacePoints;
-use nalgebra::{Point3, SMatrix, SVector, Similarity3, Translation3, UnitQuaternion, Vector3};
+use crate::pose_fit::{Equations, slope};
+use nalgebra::{Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -110,8 +111,8 @@ struct Pair<'a> {
     surface: Nearest,
 }
 
-/// Normal equations: rotation, translation, logarithm of scale.
-type Normal = (SMatrix<f64, 7, 7>, SVector<f64, 7>);
+/// Of rotation, translation and logarithm of scale.
+type Normal = Equations<7>;
 
 impl Pair<'_> {
     /// Steps while the gate closes, the last quarter of them with the smallest.
@@ -130,38 +131,33 @@ impl Pair<'_> {
     fn step(&self, at: &Similarity3<f64>, count: usize, gate: f64) -> Option<Similarity3<f64>> {
         let back = at.inverse();
         let middle = self.middle;
-        let add = |(mut left, mut right): Normal, (point, number): (Point3<f64>, usize)| {
+        let add = |mut equations: Normal, (point, number): (Point3<f64>, usize)| {
             let (to, normal) = (self.robot.points[number], self.robot.normals[number]);
             let arm = point - middle;
             let off = normal.dot(&(point - to));
-            let turn = arm.cross(&normal);
-            let slope = SVector::from([turn.x, turn.y, turn.z, normal.x, normal.y, normal.z, normal.dot(&arm)]);
+            let by_scale = normal.dot(&arm);
+            let slope = slope(&normal, &arm).push(by_scale);
             // Tukey's weight of the distance between the two: pairs at the gate's edge count for nothing.
             let weight = (1.0 - ((point - to).norm() / gate).powi(2)).max(0.0).powi(2);
-            left += weight * slope * slope.transpose();
-            right -= weight * off * slope;
-            (left, right)
+            equations.add(&slope, off, weight);
+            equations
         };
-        let join = |a: Normal, b: Normal| (a.0 + b.0, a.1 + b.1);
-        let zero = || (SMatrix::zeros(), SVector::zeros());
         let from_scan = (every(self.scan.len(), count))
             .filter_map(|i| {
                 let point = at * self.scan[i];
                 Some((point, self.surface.one(&point, gate)?.1))
             })
-            .fold(zero, add)
-            .reduce(zero, join);
+            .fold(Equations::zeros, add)
+            .reduce(Equations::zeros, std::ops::Add::add);
         let from_robot = (every(self.robot.points.len(), count))
             .filter_map(|number| {
                 let (_, i) = self.scanned.one(&(back * self.robot.points[number]), gate / at.scaling())?;
                 Some((at * self.scan[i], number))
             })
-            .fold(zero, add)
-            .reduce(zero, join);
-        let (mut left, right) = join(from_scan, from_robot);
-        let spare = 1e-6 * left.trace().max(1e-12);
-        (0..7).for_each(|i| left[(i, i)] += spare);
-        let change = left.cholesky()?.solve(&right);
+            .fold(Equations::zeros, add)
+            .reduce(Equations::zeros, std::ops::Add::add);
+        let equations = from_scan + from_robot;
+        let change = equations.step(0.0, 1e-6 * equations.information.trace().max(1e-12))?;
         let turn = UnitQuaternion::from_scaled_axis(change.fixed_rows::<3>(0).into_owned());
         let grow = change[6].clamp(-0.1, 0.1).exp();
         let about = Translation3::from(middle.coords);

@@ -2,8 +2,9 @@
 //! and, of every picture, what the arm says, `M`. A camera that the arm holds: `X` in the end effector, `B` in the base,
 //! `M = O_T_EE⁻¹`. A camera that stands and a board that the arm holds: `X` in the base, `B` in the end effector, `M = O_T_EE`.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Translation3, Vector3, Vector6};
 use shared_mem::hand_eye::Mount;
+use twin::pose_fit::moved;
 
 /// Mount and board: six numbers each, turn [rad] before shift [m].
 pub type Twelve = SMatrix<f64, 12, 1>;
@@ -27,12 +28,6 @@ pub fn link(mount: Mount, base_from_end_effector: &Isometry3<f64>) -> Isometry3<
         Mount::EyeInHand => base_from_end_effector.inverse(),
         Mount::FixedCamera => *base_from_end_effector,
     }
-}
-
-/// Turns by the first three numbers about a point, and shifts by the last three.
-fn about(pivot: &Vector3<f64>, by: &Vector6<f64>) -> Isometry3<f64> {
-    let turn = UnitQuaternion::from_scaled_axis(by.fixed_rows::<3>(0).into_owned());
-    Translation3::from(pivot + by.fixed_rows::<3>(3)) * turn * Translation3::from(-pivot)
 }
 
 /// A move by six numbers about `pivot`, along axes that `turn` takes into the camera's: the same move as the camera sees it, its turn
@@ -61,7 +56,7 @@ impl Chain {
 
     /// The same if the end effector is off by `error`: turned [rad] about its origin, then shifted [m].
     pub fn camera_from_board_with(&self, link: &Isometry3<f64>, error: &Vector6<f64>) -> Isometry3<f64> {
-        self.camera.inverse() * about(&self.pivot(link), error) * link * self.board
+        self.camera.inverse() * moved(&(link * self.board), &self.pivot(link).into(), error)
     }
 
     /// The arm's error that explains a board's pose whole.
@@ -96,11 +91,11 @@ impl Chain {
 
     /// After a step of the twelve numbers.
     pub fn stepped(&self, by: &Twelve) -> Self {
-        let moved = |pose: &Isometry3<f64>, by: Vector6<f64>| about(&pose.translation.vector, &by) * pose;
+        let about_itself = |pose: &Isometry3<f64>, by| moved(pose, &pose.translation.vector.into(), &by);
         Self {
             mount: self.mount,
-            camera: moved(&self.camera, by.fixed_rows::<6>(0).into_owned()),
-            board: moved(&self.board, by.fixed_rows::<6>(6).into_owned()),
+            camera: about_itself(&self.camera, by.fixed_rows::<6>(0).into_owned()),
+            board: about_itself(&self.board, by.fixed_rows::<6>(6).into_owned()),
         }
     }
 }

@@ -4,8 +4,9 @@
 
 use super::chain::{Chain, Twelve, link};
 use super::variance::{ArmSigma, Information, Observation, normal_equations};
-use super::view::{Equations, View};
+use super::view::View;
 use nalgebra::{Isometry3, Vector6};
+use twin::pose_fit::Equations;
 
 /// A picture with what does not change from step to step.
 #[derive(Debug, Clone)]

@@ -2,8 +2,9 @@
 
 use crate::viewpoint::lens::Lens;
 use crate::viewpoint::planar::{self, Seen};
-use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3};
 use shared_mem::statistics::median;
+use twin::pose_fit::{Equations, moved};
 
 /// A picture of the board.
 #[derive(Debug, Clone)]
@@ -15,14 +16,6 @@ pub struct View {
     /// Corners of the board: where in its plane [m], where in the picture without distortion [pixel].
     pub seen: Vec<Seen>,
     pub lens: Lens,
-}
-
-/// Squares of what is left of the pixels, its slope and its information, about a pose of the board.
-pub struct Equations {
-    /// Half the gradient of the weighted sum of squares [pixel²].
-    pub gradient: Vector6<f64>,
-    /// Its Gauss-Newton information.
-    pub information: Matrix6<f64>,
 }
 
 /// Residuals beyond so many sigmas count less, and beyond nothing but this share of them (Huber 1964).
@@ -56,27 +49,9 @@ impl View {
         self.residuals(camera_from_board).into_iter().map(weight).collect()
     }
 
-    /// The equations at a pose of the board, for moves of it in the camera's frame: turn about the camera's origin, then shift;
-    /// `None` where a corner lies behind the camera.
-    pub fn equations(&self, camera_from_board: &Isometry3<f64>, weights: &[f64]) -> Option<Equations> {
-        let (mut gradient, mut information) = (Vector6::zeros(), Matrix6::zeros());
-        for (seen, weight) in self.seen.iter().zip(weights) {
-            let p = camera_from_board * Point3::new(seen.place[0], seen.place[1], 0.0);
-            if p.z <= 1e-6 {
-                return None;
-            }
-            let there = self.lens.project(&p);
-            for axis in 0..2 {
-                let mut along = Vector3::zeros();
-                along[axis] = self.lens.focal[axis] / p.z;
-                along.z = -self.lens.focal[axis] * p[axis] / (p.z * p.z);
-                let turn = p.coords.cross(&along);
-                let slope = Vector6::new(turn.x, turn.y, turn.z, along.x, along.y, along.z);
-                gradient += *weight * (there[axis] - seen.pixel[axis]) * slope;
-                information += *weight * slope * slope.transpose();
-            }
-        }
-        Some(Equations { gradient, information })
+    /// The equations at a pose of the board, for steps of it about the camera's origin; `None` where a corner lies behind the camera.
+    pub fn equations(&self, camera_from_board: &Isometry3<f64>, weights: &[f64]) -> Option<Equations<6>> {
+        Some(planar::equations(&self.seen, &self.lens, camera_from_board, &Point3::origin(), weights)?.1)
     }
 
     /// The board in the camera's frame by this picture alone, robust against single wrong corners, and sigma of the corners [pixel];
@@ -92,14 +67,8 @@ impl View {
             let free = 1.0 - 3.0 / self.seen.len() as f64;
             sigma = median(self.residuals(&pose))? / MEDIAN_LENGTH / free.sqrt();
             let weights = self.weights(&pose, sigma.max(1e-9));
-            let Equations { gradient, information } = self.equations(&pose, &weights)?;
-            pose = moved(&pose, &-information.cholesky()?.solve(&gradient));
+            pose = moved(&pose, &Point3::origin(), &self.equations(&pose, &weights)?.step(0.0, 0.0)?);
         }
         Some((pose, sigma))
     }
-}
-
-/// A board's pose after a small move as the camera sees it: turn about the camera's origin, then shift.
-pub fn moved(camera_from_board: &Isometry3<f64>, by: &Vector6<f64>) -> Isometry3<f64> {
-    crate::viewpoint::step::moved(camera_from_board, &Point3::origin(), by)
 }

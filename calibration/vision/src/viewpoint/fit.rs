@@ -6,13 +6,13 @@ use super::refine::{self, Refined, refine};
 use super::scan::{places, scan};
 use super::search::{Moves, Reach, mean};
 use super::shape::Shape;
-use super::step::moved;
 use nalgebra::{Isometry3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use shared_mem::progress::{Planned, Progress};
 use std::sync::atomic::{AtomicU64, Ordering};
+use twin::pose_fit::moved;
 
 /// Which way to go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

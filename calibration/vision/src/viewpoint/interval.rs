@@ -63,7 +63,7 @@ pub fn interval(refined: &Refined, frames: usize) -> Option<Interval> {
 
 /// Whatever draws a border, a mesh or a mask, draws each link a little too thick or too thin, beyond what all have in common.
 fn thickness(refined: &Refined, groups: &[Group]) -> Option<Matrix6<f64>> {
-    let inverse = refined.sums().0.try_inverse()?;
+    let inverse = refined.sums().information.try_inverse()?;
     let outer = groups.iter().map(|group| (THICKNESS * THICKNESS) * group.swell * group.swell.transpose());
     Some(inverse * outer.sum::<Matrix6<f64>>() * inverse)
 }
@@ -71,7 +71,7 @@ fn thickness(refined: &Refined, groups: &[Group]) -> Option<Matrix6<f64>> {
 /// How far the pose moves when what is seen is explained otherwise, as a covariance.
 fn explained_otherwise(refined: &Refined, groups: &[Group]) -> Option<Matrix6<f64>> {
     let doubt: Vector6<f64> = groups.iter().map(|group| group.doubt.0).sum();
-    let moved = refined.sums().0.cholesky()?.solve(&doubt);
+    let moved = refined.sums().information.cholesky()?.solve(&doubt);
     Some(moved * moved.transpose())
 }
 
@@ -100,6 +100,6 @@ fn witnesses(groups: &[Group], key: impl Fn(&Group) -> (usize, usize)) -> Vec<Wi
 }
 
 fn spread(refined: &Refined, witnesses: &[Witness]) -> Option<Matrix6<f64>> {
-    let information = DMatrix::from_column_slice(6, 6, refined.sums().0.as_slice());
+    let information = DMatrix::from_column_slice(6, 6, refined.sums().information.as_slice());
     covariance(&information, witnesses.iter()).map(|found| Matrix6::from_column_slice(found.as_slice()))
 }

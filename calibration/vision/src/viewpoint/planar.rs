@@ -2,10 +2,8 @@
 //! pixels, from both of the poses that a plane far away hardly tells apart (Schweighofer & Pinz 2006).
 
 use super::lens::Lens;
-use super::step::moved;
-use nalgebra::{
-    DMatrix, Isometry3, Matrix3, Matrix6, Point3, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6,
-};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use twin::pose_fit::{Equations, moved, pixel_direction, slope};
 
 /// A point of the plane, and where it is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,9 +25,10 @@ pub fn pose(seen: &[Seen], lens: &Lens) -> Option<Isometry3<f64>> {
     let tilted = 2.0 * normal.dot(&sight) * sight - normal;
     let turn = UnitQuaternion::rotation_between(&normal, &tilted)?;
     let second = Isometry3::from_parts(first.translation, turn * first.rotation);
-    let found = [first, second].into_iter().filter_map(|start| refined(seen, lens, &start));
+    let of_plane = |about: Isometry3<f64>| about * Translation3::from(-middle(seen));
+    let found = [first, second].into_iter().filter_map(|start| refined(seen, lens, &of_plane(start)));
     let (_, best) = found.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
-    Some(best * Translation3::from(-middle(seen)))
+    Some(best)
 }
 
 /// Middle of the points, in the plane.
@@ -39,7 +38,7 @@ fn middle(seen: &[Seen]) -> Vector3<f64> {
     Vector3::new(sum[0] / count, sum[1] / count, 0.0)
 }
 
-/// Pose of the plane about the middle of the points.
+/// Pose of the plane about the middle of the points, without least squares.
 fn from_homography(seen: &[Seen], lens: &Lens) -> Option<Isometry3<f64>> {
     let middle = middle(seen);
     let sight = |s: &Seen| [0, 1].map(|i| (s.pixel[i] - lens.centre[i]) / lens.focal[i]);
@@ -92,48 +91,47 @@ pub fn homography(pairs: &[([f64; 2], [f64; 2])]) -> Option<Matrix3<f64>> {
     Some(of_to.try_inverse()? * between * of_from)
 }
 
-/// Least squares on the pixels, the plane's frame at the middle of the points: what is left [pixel²], and the pose.
+/// Least squares on the pixels: what is left [pixel²], and the pose.
 fn refined(seen: &[Seen], lens: &Lens, start: &Isometry3<f64>) -> Option<(f64, Isometry3<f64>)> {
-    let middle = middle(seen);
-    let equations = |pose: &Isometry3<f64>| -> Option<(f64, Matrix6<f64>, Vector6<f64>)> {
-        let pivot = pose.translation.vector;
-        let (mut cost, mut information, mut gradient) = (0.0, Matrix6::zeros(), Vector6::zeros());
-        for s in seen {
-            let p = pose * Point3::from(Vector3::new(s.place[0], s.place[1], 0.0) - middle);
-            if p.z <= 0.0 {
-                return None;
-            }
-            let there = lens.project(&p);
-            for axis in 0..2 {
-                let off = there[axis] - s.pixel[axis];
-                let mut along = Vector3::zeros();
-                along[axis] = lens.focal[axis] / p.z;
-                along.z = -lens.focal[axis] * p[axis] / (p.z * p.z);
-                let turn = (p.coords - pivot).cross(&along);
-                let slope = Vector6::new(turn.x, turn.y, turn.z, along.x, along.y, along.z);
-                cost += off * off;
-                information += slope * slope.transpose();
-                gradient += off * slope;
-            }
-        }
-        Some((cost, information, gradient))
-    };
+    let middle = Point3::from(middle(seen));
+    let weights = vec![1.0; seen.len()];
+    let at = |pose: &Isometry3<f64>| equations(seen, lens, pose, &(pose * middle), &weights);
     let mut pose = *start;
-    let mut here = equations(&pose)?;
+    let (mut cost, mut here) = at(&pose)?;
     let mut damping = 1e-3;
     for _ in 0..STEPS {
-        let mut damped = here.1;
-        for i in 0..6 {
-            damped[(i, i)] *= 1.0 + damping;
-        }
-        let step = -damped.cholesky()?.solve(&here.2);
-        let next = moved(&pose, &Point3::from(pose.translation.vector), &step);
-        match equations(&next) {
-            Some(there) if there.0 <= here.0 => (pose, here, damping) = (next, there, damping * 0.1),
+        let next = moved(&pose, &(pose * middle), &here.step(damping, 0.0)?);
+        match at(&next) {
+            Some((less, there)) if less <= cost => (pose, cost, here, damping) = (next, less, there, damping * 0.1),
             _ => damping *= 10.0,
         }
     }
-    Some((here.0, pose))
+    Some((cost, pose))
+}
+
+/// What is left of the pixels [pixel²] at a pose of the plane, each point with its weight, and the equations there for steps about
+/// `pivot` (camera's frame); `None` where a point lies behind the camera.
+pub fn equations(
+    seen: &[Seen],
+    lens: &Lens,
+    pose: &Isometry3<f64>,
+    pivot: &Point3<f64>,
+    weights: &[f64],
+) -> Option<(f64, Equations<6>)> {
+    let (mut cost, mut equations) = (0.0, Equations::zeros());
+    for (seen, weight) in seen.iter().zip(weights) {
+        let p = pose * Point3::new(seen.place[0], seen.place[1], 0.0);
+        if p.z <= 1e-6 {
+            return None;
+        }
+        let there = lens.project(&p);
+        for (axis, across) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+            let off = there[axis] - seen.pixel[axis];
+            cost += weight * off * off;
+            equations.add(&slope(&pixel_direction(&p, lens.focal, across), &(p - pivot)), off, *weight);
+        }
+    }
+    Some((cost, equations))
 }
 
 #[cfg(test)]

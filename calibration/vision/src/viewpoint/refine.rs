@@ -7,11 +7,11 @@
 use super::frame::Frame;
 use super::outline::{Outliner, Place};
 use super::shape::Shape;
-use super::step::moved;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use shared_mem::ending;
 use shared_mem::statistics::median;
 use std::ops::Range;
+use twin::pose_fit::{Equations, moved, pixel_direction, slope};
 
 /// A pose and what the pictures say there.
 #[derive(Debug, Clone)]
@@ -101,10 +101,10 @@ pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Ra
             if ending::asked() {
                 return None;
             }
-            let (information, gradient) = here.sums();
+            let equations = here.sums();
             let mut trials = 0;
             let better = loop {
-                let step = solve(&information, &gradient, damping)?;
+                let step = equations.step(damping, FLOOR * equations.information.diagonal().max().max(1e-9))?;
                 let there = work.at(&moved(&here.camera_from_base, &here.pivot, &step));
                 // Near the end the cost flickers with the places that come and go, while the step stays true.
                 match there.filter(|there| stage.exact || there.cost < here.cost) {
@@ -116,7 +116,7 @@ pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Ra
             let Some((there, step)) = better else { break };
             damping = (damping * 0.1).max(1e-6);
             let weight: f64 = here.groups.iter().map(|group| group.weight).sum();
-            let motion = ((information * step).dot(&step) / weight.max(1e-9)).sqrt();
+            let motion = ((equations.information * step).dot(&step) / weight.max(1e-9)).sqrt();
             here = there;
             if motion < STILL {
                 break;
@@ -135,9 +135,9 @@ pub fn at(frames: &[Frame], shape: &Shape, camera_from_base: &Isometry3<f64>) ->
 
 impl Refined {
     /// The equations of all groups.
-    pub fn sums(&self) -> (Matrix6<f64>, Vector6<f64>) {
-        let sum = (Matrix6::zeros(), Vector6::zeros());
-        self.freed().fold(sum, |(h, g), group| (h + group.information, g + group.gradient))
+    pub fn sums(&self) -> Equations<6> {
+        let of = |Group { information, gradient, .. }: Group| Equations { information, gradient };
+        self.freed().map(of).fold(Equations::zeros(), |sum, group| sum + group)
     }
 
     /// The groups' equations for the pose alone, what all links look thicker by eliminated: a lens, a mask's border and a
@@ -160,15 +160,8 @@ impl Refined {
     }
 }
 
-/// The damped step down.
-fn solve(information: &Matrix6<f64>, gradient: &Vector6<f64>, damping: f64) -> Option<Vector6<f64>> {
-    let mut damped = *information;
-    let floor = 1e-9 * information.diagonal().max().max(1e-9);
-    for i in 0..6 {
-        damped[(i, i)] += damping * information[(i, i)] + floor;
-    }
-    damped.cholesky().map(|factor| -factor.solve(gradient))
-}
+/// What each number's information is larger by, as a share of the largest [1]: a choice, far below what a picture shows.
+const FLOOR: f64 = 1e-9;
 
 /// At the last stage an offset counts half at this multiple of the usual one, but not below that [pixel].
 const OUTLIERS: f64 = 3.0;
@@ -240,7 +233,8 @@ impl<'a> Work<'a> {
                 let clear = length * pull.weight;
                 cost += length - clear + clear * ratio / (1.0 + ratio);
                 let weight = clear / (1.0 + ratio).powi(2);
-                let slope = slope(place, frame.lens(self.stage.level).focal, &pivot, &pull.direction);
+                let along = pixel_direction(&place.point, frame.lens(self.stage.level).focal, pull.direction);
+                let slope = slope(&along, &(place.point - pivot));
                 let at = groups.iter().position(|g| (g.frame, g.link) == (number, place.link));
                 let group = match at {
                     Some(at) => &mut groups[at],
@@ -273,13 +267,4 @@ impl<'a> Work<'a> {
         let (cost, swells) = (cost / total.max(1e-9), self.stage.exact);
         Some(Refined { camera_from_base, cost, groups, pivot, drawings: 0, swells })
     }
-}
-
-/// How the offset of a place grows with the six numbers of [`moved`].
-fn slope(place: &Place, focal: [f64; 2], pivot: &Point3<f64>, direction: &[f64; 2]) -> Vector6<f64> {
-    let p = place.point;
-    let (a, b) = (direction[0] * focal[0] / p.z, direction[1] * focal[1] / p.z);
-    let along = Vector3::new(a, b, -(a * p.x + b * p.y) / p.z);
-    let turn = (p - pivot).cross(&along);
-    Vector6::new(turn.x, turn.y, turn.z, along.x, along.y, along.z)
 }

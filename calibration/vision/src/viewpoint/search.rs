@@ -2,10 +2,10 @@
 
 use super::frame::Frame;
 use super::shape::Shape;
-use super::step::moved;
 use inference::estimate::problem::Unknown;
 use inference::estimate::{Swarm, search as estimate_search};
 use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use twin::pose_fit::moved;
 
 /// How far from the truth a start may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
