@@ -19,11 +19,11 @@ const LONGEST: Duration = Duration::from_secs(30);
 /// fifty times a second, and takes an order before its next report.
 const REST: u32 = 35;
 /// Less than this is standing still [m].
-const STILL: f64 = 2e-4;
+const REST_MOTION: f64 = 2e-4;
 /// How far the fingers may rest from where they were to go [m]: grippers count in steps of up to 0.6 mm.
 const REACHED: f64 = 2e-3;
 /// Pause between two looks.
-const LOOK: Duration = Duration::from_millis(10);
+const POLL_PERIOD: Duration = Duration::from_millis(10);
 
 /// Tell the gripper of a running bridge what to do, and wait until its fingers rest
 #[derive(Debug, Args)]
@@ -160,7 +160,7 @@ fn next(states: &Subscriber<GripperState>, patience: Duration) -> Result<Option<
         if let Some(state) = states.receive()? {
             return Ok(Some(state));
         }
-        thread::sleep(LOOK);
+        thread::sleep(POLL_PERIOD);
     }
     Ok(None)
 }
@@ -173,7 +173,7 @@ fn rest(states: &Subscriber<GripperState>, ordered_ns: u64) -> Result<GripperSta
         let Some(state) = next(states, PATIENCE)? else {
             bail!("the gripper fell silent; the bridge says why");
         };
-        if state.stamp_ns < ordered_ns || (state.width - stands).abs() >= STILL || stands.is_nan() {
+        if state.stamp_ns < ordered_ns || (state.width - stands).abs() >= REST_MOTION || stands.is_nan() {
             (stands, still) = (state.width, 0);
             continue;
         }

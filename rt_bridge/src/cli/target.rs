@@ -31,7 +31,7 @@ const PERIOD: Duration = Duration::from_millis(20);
 /// Targets in a row without motion after which the arm has come to the end of its way.
 const REST: u32 = 15;
 /// Less than this is standing still [rad/s, m].
-const STILL: f64 = 1e-5;
+const REST_SPEED: f64 = 1e-5;
 
 /// Send the arm or the fingers of a running bridge somewhere, as a stream of targets
 ///
@@ -203,7 +203,7 @@ impl ArmLine {
                 !(ours && state.motion == MotionStatus::Braked),
                 "the arm was braked; the bridge says why on /events"
             );
-            let rests = ours && state.motion_played > REST && state.dq_d.iter().all(|dq| dq.abs() < STILL);
+            let rests = ours && state.motion_played > REST && state.dq_d.iter().all(|dq| dq.abs() < REST_SPEED);
             still = if rests { still + 1 } else { 0 };
             if still >= REST {
                 return self.leave(target.stream);

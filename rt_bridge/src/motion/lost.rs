@@ -9,12 +9,12 @@ const ROUNDING: f64 = 3e-7;
 /// What a robot says is off by no more from what it does, its own arithmetic included [rad].
 const ECHO: f64 = 2e-6;
 /// After more it has stopped by itself.
-const MOST: u64 = 20;
+const MAX_LOST_PERIODS: u64 = 20;
 
 /// The command in force now, where that is not as `sent`: `before` came before that, `in_force` is what its newest
 /// state says, `periods` after the one that `sent` answered. `None`: it has what was sent, or nobody can tell what it has.
 pub(super) fn in_force(sent: &Trace, before: &Trace, in_force: &Joints, periods: u64, period_s: f64) -> Option<Trace> {
-    if !(1..=MOST).contains(&periods) {
+    if !(1..=MAX_LOST_PERIODS).contains(&periods) {
         return None;
     }
     let off =

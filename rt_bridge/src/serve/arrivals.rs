@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// How long a connection may take to send its first request. libfranka sends it at once.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Connections that may be silent at a time. One more, and the oldest is closed.
-const MOST: usize = 64;
+const MAX_SILENT: usize = 64;
 /// Connections that are taken in one look, so that a flood of them cannot stop the robot's clock.
 const AT_ONCE: usize = 32;
 
@@ -76,7 +76,7 @@ impl Arrivals {
                 Err(gone) => outcomes.push(Outcome::Closed(arrival.peer, gone)),
             }
         }
-        while self.silent.len() > MOST {
+        while self.silent.len() > MAX_SILENT {
             outcomes.extend(self.silent.pop_front().map(|arrival| Outcome::Closed(arrival.peer, Gone::Crowded)));
         }
         outcomes
@@ -147,7 +147,7 @@ mod tests {
         let mut arrivals = Arrivals::at(listener, Inbox::of_the_arm).expect("a listener");
         let mut clients = Vec::new();
         let mut closed = Vec::new();
-        for _ in 0..MOST + 10 {
+        for _ in 0..MAX_SILENT + 10 {
             clients.push(TcpStream::connect(address).expect("it listens"));
             closed.extend(arrivals.look(Instant::now()));
         }
@@ -158,6 +158,6 @@ mod tests {
         for (client, outcome) in first.zip(&closed) {
             assert!(matches!(outcome, Outcome::Closed(peer, Gone::Crowded) if *peer == client), "{outcome:?}");
         }
-        assert_eq!((arrivals.silent.len(), closed.len()), (MOST, 10));
+        assert_eq!((arrivals.silent.len(), closed.len()), (MAX_SILENT, 10));
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Display;
 use std::time::{Duration, Instant};
 
 /// Lines of one kind within [`WINDOW`].
-const MOST: u64 = 5;
+const MAX_LINES: u64 = 5;
 const WINDOW: Duration = Duration::from_secs(10);
 
 /// What a line is about. Each kind has its own allowance.
@@ -67,7 +67,7 @@ impl Allowance {
         if now.duration_since(self.since) >= WINDOW {
             (self.since, self.written) = (now, 0);
         }
-        if self.written == MOST {
+        if self.written == MAX_LINES {
             self.left_out += 1;
             return None;
         }

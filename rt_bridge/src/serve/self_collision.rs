@@ -7,7 +7,7 @@ use twin::arm::{JointState, Joints, ModelError};
 use twin::scene::ArmOutline;
 
 /// Links that approach each other no faster than this do not [m/s]: a measured velocity is never quite nought.
-const STILL: f64 = 5e-3;
+const APPROACH_SPEED: f64 = 5e-3;
 /// How far ahead is looked to tell approaching from parting [s].
 const AHEAD: f64 = 0.01;
 
@@ -39,7 +39,7 @@ impl SelfCollision {
     pub(super) fn threatens(&mut self, joints: &JointState) -> bool {
         let gap = self.least_gap(&joints.q);
         let soon: Joints = std::array::from_fn(|i| joints.q[i] + AHEAD * joints.dq[i]);
-        gap <= 0.0 && self.least_gap(&soon) < gap - AHEAD * STILL
+        gap <= 0.0 && self.least_gap(&soon) < gap - AHEAD * APPROACH_SPEED
     }
 
     /// Between the two links that are nearest to each other with the joints at `q` [rad], in metres.

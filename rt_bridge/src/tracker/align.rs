@@ -23,7 +23,7 @@ const LIFTED: f64 = 0.004;
 /// What a pose is known to beside the picture, one sigma [m, rad]: it keeps what cannot be seen from running away.
 pub(super) const EXPECTED: [f64; 2] = [0.05, 0.5];
 /// A step that changes nothing [m, rad].
-const STILL: f64 = 2e-5;
+const SMALLEST_STEP: f64 = 2e-5;
 
 /// How one fit goes on: half length of the lines [pixel] and how far off a depth may be and still count [m], step by step.
 pub(super) type Schedule = &'static [(usize, f32)];
@@ -65,7 +65,7 @@ impl Scene<'_> {
             information = equations.information;
             let step = equations.step(0.0, 0.0)?;
             pose = moved(&pose, &pose.translation.vector.into(), &step);
-            if step.amax() < STILL {
+            if step.amax() < SMALLEST_STEP {
                 break;
             }
         }

@@ -1,9 +1,9 @@
 //! What the object looks like beside what surrounds it: two histograms of colour, learnt while the object is seen.
 
 /// Steps of each of red, green and blue.
-const STEPS: usize = 16;
+const STEPS_PER_CHANNEL: usize = 16;
 /// One pixel's colour says no more than this, as a logarithm of odds: neighbours agree too often to be independent.
-const MOST: f32 = 2.0;
+const MAX_LOG_ODDS: f32 = 2.0;
 /// Share of a picture in a histogram that is no more than chance.
 const CHANCE: f32 = 1e-3;
 /// Share of the newest picture once colours are known.
@@ -31,7 +31,7 @@ pub(super) struct Colors {
 
 impl Colors {
     pub(super) fn new() -> Self {
-        let bins = STEPS * STEPS * STEPS;
+        let bins = STEPS_PER_CHANNEL * STEPS_PER_CHANNEL * STEPS_PER_CHANNEL;
         Self { object: vec![0.0; bins], around: vec![0.0; bins], odds: vec![0.0; bins], known: false }
     }
 
@@ -64,7 +64,7 @@ impl Colors {
             self.object[bin] += share * (object[bin] / sums[1] - self.object[bin]);
             self.around[bin] += share * (around[bin] / sums[0] - self.around[bin]);
             let odds = ((self.object[bin] + CHANCE) / (self.around[bin] + CHANCE)).ln();
-            self.odds[bin] = odds.clamp(-MOST, MOST);
+            self.odds[bin] = odds.clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS);
         }
     }
 }

@@ -17,7 +17,7 @@ const EVERY: usize = 2;
 /// What rises less is the table [m].
 const LEAST_HEIGHT: f32 = 0.01;
 /// Fewer pixels (of those looked at) are no object.
-const FEWEST: usize = 20;
+const MIN_PIXELS: usize = 20;
 /// Heaps that are looked into, the largest first.
 const HEAPS: usize = 6;
 /// Turns that are tried [rad].
@@ -177,7 +177,7 @@ impl Scene<'_> {
         for start in 0..rises.len() {
             if rises[start] > 0.0 {
                 let pixels = flood(&mut rises, width, start, 8.0 * self.table.noise);
-                if pixels.len() >= FEWEST {
+                if pixels.len() >= MIN_PIXELS {
                     heaps.push(pixels);
                 }
             }

@@ -9,11 +9,11 @@ use nalgebra::Isometry3;
 /// Edge of a block [pixel].
 const BLOCK: usize = 4;
 /// Pixels of the object that must be seen, at least.
-const LEAST: u32 = 60;
+const MIN_PIXELS: u32 = 60;
 /// A block with fewer pixels of the object says nothing.
-const FEWEST: u32 = 6;
+const MIN_PIXELS_OF_BLOCK: u32 = 6;
 /// A surface this far from where it is drawn is another one [m]: a D455's own error at a metre and a half.
-const OFF: f32 = 0.008;
+const OTHER_SURFACE: f32 = 0.008;
 /// Half length of the lines across the outline [pixel].
 const REACH: usize = 8;
 
@@ -41,7 +41,7 @@ impl Verdict {
 
     /// Whether the object is there, and there is enough of it to say where.
     pub(super) fn holds(&self) -> bool {
-        self.agree >= LEAST
+        self.agree >= MIN_PIXELS
             && self.agree * 10 >= self.drawn
             && self.behind * 5 <= self.agree
             && self.outline_off < if self.behind * 20 <= self.agree { 2.5 } else { 1.8 }
@@ -87,18 +87,18 @@ impl Scene<'_> {
                 if seen == 0.0 || patch.arm[at] > m {
                     continue;
                 }
-                let reach = 4.0 * self.table.noise + 2.0 * OFF * m * m;
+                let reach = 4.0 * self.table.noise + 2.0 * OTHER_SURFACE * m * m;
                 nearer += u32::from(seen - m > reach);
                 farther += u32::from(m - seen > reach);
                 (sum, depth, count) = (sum + (seen - m), m, count + 1);
             }
         }
         verdict.drawn += drawn;
-        if count < FEWEST {
+        if count < MIN_PIXELS_OF_BLOCK {
             return;
         }
         let off = sum / count as f32;
-        let reach = OFF * depth * depth + 3.0 * self.table.noise / (count as f32).sqrt();
+        let reach = OTHER_SURFACE * depth * depth + 3.0 * self.table.noise / (count as f32).sqrt();
         if 2 * nearer > count || off > reach {
             verdict.covered += count;
         } else if 2 * farther > count || off < -reach {

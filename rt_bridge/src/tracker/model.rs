@@ -6,7 +6,7 @@ use twin::render::Mesh;
 use twin::scene::ObjectShape;
 
 /// Edges that differ by less count as equal [m]: a depth camera at a metre cannot tell them apart.
-const SAME: f64 = 0.002;
+const EQUAL_EDGES: f64 = 0.002;
 /// Corners that are asked whether they touch the table, at most.
 const CORNERS: usize = 64;
 /// Corners of a mesh that are compared to find its symmetries, at most.
@@ -119,12 +119,12 @@ fn turns_of_a_cube() -> impl Iterator<Item = UnitQuaternion<f64>> {
 
 fn looks_the_same(shape: &ObjectShape, turn: &UnitQuaternion<f64>) -> bool {
     match shape {
-        ObjectShape::Box { half_extents } => ((turn * half_extents).abs() - half_extents).amax() < SAME / 2.0,
+        ObjectShape::Box { half_extents } => ((turn * half_extents).abs() - half_extents).amax() < EQUAL_EDGES / 2.0,
         ObjectShape::Mesh { points, .. } => {
             let every = points.len().div_ceil(COMPARED);
             points.iter().step_by(every).all(|p| {
                 let turned = turn * p;
-                points.iter().any(|other| (other - turned).norm_squared() < SAME * SAME)
+                points.iter().any(|other| (other - turned).norm_squared() < EQUAL_EDGES * EQUAL_EDGES)
             })
         }
     }
@@ -144,9 +144,9 @@ fn axis_of_revolution(shape: &ObjectShape) -> Option<Vector3<f64>> {
             let every = points.len().div_ceil(COMPARED);
             points.iter().step_by(every).all(|p| {
                 let (height, out, _) = place(p);
-                let mut met = [out < SAME; SECTORS];
+                let mut met = [out < EQUAL_EDGES; SECTORS];
                 for (other_height, other_out, angle) in points.iter().map(place) {
-                    if (other_height - height).abs() < SAME && (other_out - out).abs() < SAME {
+                    if (other_height - height).abs() < EQUAL_EDGES && (other_out - out).abs() < EQUAL_EDGES {
                         let turn = (angle / std::f64::consts::TAU).rem_euclid(1.0);
                         met[((turn * SECTORS as f64) as usize).min(SECTORS - 1)] = true;
                     }

@@ -13,7 +13,7 @@ const BAND: f32 = 0.03;
 /// Distances are never off by more than this factor.
 const MOST_WRONG: f32 = 1.05;
 /// Fewer measurements than these say nothing about the table.
-const FEWEST: usize = 100;
+const MIN_MEASUREMENTS: usize = 100;
 /// Pictures over which the plane is averaged: camera and table stand still.
 const MEMORY: f32 = 20.0;
 /// Least noise of the inverse depth [1/m].
@@ -86,7 +86,7 @@ impl Table {
                 }
             }
         }
-        if samples.len() < FEWEST {
+        if samples.len() < MIN_MEASUREMENTS {
             return;
         }
         let mut normal = self.measured;

@@ -32,7 +32,7 @@ const TRIALS: u64 = 1000;
 /// Points that are asked about each.
 const ASKED: usize = 1000;
 /// Refinements; and the tolerance in standard deviations of what lies on the plane.
-const STEPS: usize = 12;
+const REFINEMENTS: usize = 12;
 const DEVIATIONS: f64 = 2.5;
 /// A normal of a point on the plane differs by less from the plane's: cosine.
 const ALIKE: f64 = 0.8;
@@ -68,7 +68,7 @@ impl Plane {
             .max_by_key(|(count, trial, _)| (*count, *trial));
         let mut plane = proposed?.2;
         let mut tolerance = wanted.tolerance;
-        for _ in 0..STEPS {
+        for _ in 0..REFINEMENTS {
             let on: Vec<usize> = (0..points.len()).filter(|i| plane.holds(points, normals, *i, tolerance)).collect();
             if on.len() < 3 {
                 break;
@@ -137,7 +137,7 @@ pub struct Level {
 const LEVEL: f64 = 0.01;
 /// A scene has so many levels at most, none with less than this share of the largest one's points.
 const LEVELS: usize = 6;
-const LEAST: f64 = 0.1;
+const MIN_LEVEL_SHARE: f64 = 0.1;
 /// The table has at least this share of them.
 const OF_TABLE: f64 = 1.0 / 3.0;
 
@@ -154,7 +154,7 @@ pub fn levels(surface: &Surface, up: &Vector3<f64>, within: f64) -> Vec<Level> {
         let is_on = |i: usize| plane.distance(&points[i]).abs() < LEVEL && normals[i].dot(&plane.normal) > ALIKE;
         let on: Vec<usize> = (0..points.len()).filter(|i| is_on(*i)).collect();
         let most = levels.first().map_or(0, |level| level.plane.points);
-        if on.is_empty() || (on.len() as f64) < LEAST * most as f64 {
+        if on.is_empty() || (on.len() as f64) < MIN_LEVEL_SHARE * most as f64 {
             break;
         }
         let middle = on.iter().map(|i| points[*i].coords).sum::<Vector3<f64>>() / on.len() as f64;

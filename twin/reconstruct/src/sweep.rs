@@ -4,19 +4,19 @@
 use crate::field::Grid;
 
 /// Distances beyond this are not needed exactly [voxel].
-const FAR: f32 = 1e4;
+const FARTHEST: f32 = 1e4;
 /// Times all eight directions are swept.
-const ROUNDS: usize = 2;
+const SWEEPS: usize = 2;
 
 /// The signed distance [voxel] of the surface where `level` changes its sign.
 pub(crate) fn signed_distance(grid: &Grid, level: &[f32]) -> Vec<f32> {
     let strides = grid.strides();
-    let mut distance = vec![FAR; level.len()];
+    let mut distance = vec![FARTHEST; level.len()];
     for (index, distance) in distance.iter_mut().enumerate() {
         let node = grid.node(index);
         let mut square = 0.0;
         for axis in 0..3 {
-            let mut nearest = FAR;
+            let mut nearest = FARTHEST;
             let mut look = |neighbour: usize| {
                 if (level[neighbour] < 0.0) != (level[index] < 0.0) {
                     nearest = nearest.min((level[index] / (level[index] - level[neighbour])).abs().max(1e-3));
@@ -28,7 +28,7 @@ pub(crate) fn signed_distance(grid: &Grid, level: &[f32]) -> Vec<f32> {
             if node[axis] + 1 < grid.dims[axis] {
                 look(index + strides[axis]);
             }
-            if nearest < FAR {
+            if nearest < FARTHEST {
                 square += 1.0 / (nearest * nearest);
             }
         }
@@ -37,8 +37,8 @@ pub(crate) fn signed_distance(grid: &Grid, level: &[f32]) -> Vec<f32> {
             *distance = 1.0 / square.sqrt();
         }
     }
-    let known: Vec<bool> = distance.iter().map(|d| *d < FAR).collect();
-    for round in 0..8 * ROUNDS {
+    let known: Vec<bool> = distance.iter().map(|d| *d < FARTHEST).collect();
+    for round in 0..8 * SWEEPS {
         sweep(grid, &known, &mut distance, round % 8);
     }
     distance.iter().zip(level).map(|(distance, level)| if *level < 0.0 { -distance } else { *distance }).collect()
@@ -47,8 +47,8 @@ pub(crate) fn signed_distance(grid: &Grid, level: &[f32]) -> Vec<f32> {
 /// Distances [voxel] from the nodes of a set.
 pub(crate) fn distance_from(grid: &Grid, is_in: impl Fn(usize) -> bool) -> Vec<f32> {
     let known: Vec<bool> = (0..grid.len()).map(is_in).collect();
-    let mut distance: Vec<f32> = known.iter().map(|known| if *known { 0.0 } else { FAR }).collect();
-    for round in 0..8 * ROUNDS {
+    let mut distance: Vec<f32> = known.iter().map(|known| if *known { 0.0 } else { FARTHEST }).collect();
+    for round in 0..8 * SWEEPS {
         sweep(grid, &known, &mut distance, round % 8);
     }
     distance
@@ -68,8 +68,9 @@ fn sweep(grid: &Grid, known: &[bool], distance: &mut [f32], direction: usize) {
                     continue;
                 }
                 let lower = [0, 1, 2].map(|axis| {
-                    let before = if node[axis] > 0 { distance[index - strides[axis]] } else { FAR };
-                    let after = if node[axis] + 1 < grid.dims[axis] { distance[index + strides[axis]] } else { FAR };
+                    let before = if node[axis] > 0 { distance[index - strides[axis]] } else { FARTHEST };
+                    let after =
+                        if node[axis] + 1 < grid.dims[axis] { distance[index + strides[axis]] } else { FARTHEST };
                     before.min(after)
                 });
                 let found = upwind(lower);

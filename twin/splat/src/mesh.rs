@@ -3,7 +3,7 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 /// Facets around a capsule: at 1.3 m the corners stand out by less than half a pixel.
-const AROUND: u32 = 24;
+const FACETS: u32 = 24;
 /// Rings of each half-sphere.
 const RINGS: u32 = 5;
 
@@ -45,18 +45,18 @@ impl Mesh {
                 (f64::from(ring - RINGS) / f64::from(RINGS - 1), b)
             };
             let (height, width) = (latitude * std::f64::consts::FRAC_PI_2).sin_cos();
-            for step in 0..AROUND {
-                let (sin, cos) = (f64::from(step) / f64::from(AROUND) * std::f64::consts::TAU).sin_cos();
+            for step in 0..FACETS {
+                let (sin, cos) = (f64::from(step) / f64::from(FACETS) * std::f64::consts::TAU).sin_cos();
                 let offset = Vector3::new(width * cos, width * sin, height) * radius;
                 points.push((centre + turn * offset).cast::<f32>());
             }
         }
         let mut triangles = Vec::new();
         for ring in 0..2 * RINGS - 1 {
-            for step in 0..AROUND {
-                let next = (step + 1) % AROUND;
-                let [a, b] = [ring * AROUND + step, ring * AROUND + next];
-                let [c, d] = [a + AROUND, b + AROUND];
+            for step in 0..FACETS {
+                let next = (step + 1) % FACETS;
+                let [a, b] = [ring * FACETS + step, ring * FACETS + next];
+                let [c, d] = [a + FACETS, b + FACETS];
                 triangles.extend([[a, b, d], [a, d, c]]);
             }
         }

@@ -10,7 +10,7 @@ use std::borrow::Cow;
 /// Longest header that is looked for [bytes].
 const LONGEST: usize = 1 << 16;
 /// Highest degree of the colours that is drawn, and that is read.
-const MOST: usize = 3;
+const MAX_DEGREE: usize = 3;
 const HIGHEST: usize = 8;
 /// Thickness of a splat that has none, of its smaller extent: a rotation needs three axes.
 const THIN: f32 = 1e-3;
@@ -146,11 +146,12 @@ pub(super) fn read(file: &File<'_>) -> Result<Read, String> {
     let names = (0..).map(|n| format!("f_rest_{n}")).take_while(|name| vertices.has(name));
     let rest = names.map(|name| column(&name)).collect::<Result<Vec<_>, _>>()?;
     let whole = degree(rest.len())?;
-    let (degree, third) = (whole.min(MOST), rest.len() / 3);
+    let (degree, third) = (whole.min(MAX_DEGREE), rest.len() / 3);
     let more = (degree + 1).pow(2) - 1;
     let mut read = Read { cloud: SplatCloud { degree, ..SplatCloud::default() }, remarks: Vec::new() };
     if degree < whole {
-        read.remarks.push(format!("its colours are of degree {whole}, and those above degree {MOST} were left out"));
+        read.remarks
+            .push(format!("its colours are of degree {whole}, and those above degree {MAX_DEGREE} were left out"));
     }
     if thickness.is_none() {
         read.remarks.push("its splats have two scales: they were read as discs without thickness".into());

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 use shared_mem::lens::Distortion;
 
 /// Splats whose centre is nearer are not drawn [m].
-const NEAR: f64 = 0.05;
+const NEAREST: f64 = 0.05;
 /// Variance of the low-pass [pixel²].
 const LOW_PASS: f64 = 0.3;
 /// Light kept back by less than this is nothing: half a step of eight bits, about.
@@ -104,7 +104,7 @@ impl<T: Real> View<T> {
     /// The splat behind this camera; `None` when it is behind the camera or too faint.
     pub(super) fn forward(&self, bell: &Bell<T>) -> Option<Forward<T>> {
         let at = self.rotation * bell.centre + self.translation;
-        if at.z < T::of(NEAR) || bell.opacity < T::of(FAINTEST) {
+        if at.z < T::of(NEAREST) || bell.opacity < T::of(FAINTEST) {
             return None;
         }
         let inverse = T::one() / at.z;

@@ -37,7 +37,7 @@ pub struct Raster {
 }
 
 /// Nearer surfaces are cut away [m].
-const NEAR: f32 = 0.05;
+const NEAREST: f32 = 0.05;
 /// Share of light in full shadow.
 const AMBIENT: f32 = 0.45;
 
@@ -161,18 +161,18 @@ fn run(inverse_depth: &mut [f32], colors: &mut [u32], start: f32, step: f32, col
     }
 }
 
-/// The part of a triangle beyond [`NEAR`]: up to four corners, and how many.
+/// The part of a triangle beyond [`NEAREST`]: up to four corners, and how many.
 fn clip_near(triangle: [Point3<f32>; 3]) -> ([Point3<f32>; 4], usize) {
     let mut polygon = [Point3::origin(); 4];
     let mut count = 0;
     for i in 0..3 {
         let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
-        if a.z >= NEAR {
+        if a.z >= NEAREST {
             polygon[count] = a;
             count += 1;
         }
-        if (a.z >= NEAR) != (b.z >= NEAR) {
-            polygon[count] = a + (b - a) * ((NEAR - a.z) / (b.z - a.z));
+        if (a.z >= NEAREST) != (b.z >= NEAREST) {
+            polygon[count] = a + (b - a) * ((NEAREST - a.z) / (b.z - a.z));
             count += 1;
         }
     }

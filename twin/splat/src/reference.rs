@@ -66,7 +66,7 @@ impl Picture {
 /// Edge of a tile [pixel].
 pub(super) const TILE: usize = 16;
 /// No splat keeps back all light.
-pub(super) const MOST: f64 = 0.99;
+pub(super) const MAX_ALPHA: f64 = 0.99;
 /// Light of which less is left does not change a picture any more.
 pub(super) const SPENT: f64 = 1e-4;
 
@@ -236,7 +236,7 @@ impl<'a> Tile<'a> {
                     if exponent < lowest {
                         continue;
                     }
-                    let alpha = (splat.opacity * exponent.exp()).min(MOST);
+                    let alpha = (splat.opacity * exponent.exp()).min(MAX_ALPHA);
                     if alpha >= FAINTEST {
                         light.add(alpha, &splat.color, splat.depth, *instance);
                         open -= usize::from(light.left < SPENT);

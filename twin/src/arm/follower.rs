@@ -17,7 +17,7 @@ const CALM_SPEED: f64 = 0.995;
 /// The same near a stop, where the speed limit falls: as a distance [rad].
 const UNSEEN: f64 = 1.2e-3;
 /// Periods after which the highest speed near a stop is set anew.
-const ANEW: u32 = 10;
+const PERIODS_PER_SPEED_LIMIT: u32 = 10;
 /// Share of the deceleration that stopping counts on with which the speed falls on the way towards a stop: less than a calm
 /// way brakes with, so that it can be kept.
 const FALLING: f64 = 0.6;
@@ -151,7 +151,8 @@ impl Follower {
         let LookAhead::Stop(period_s) = self.ahead else { return 0.0 };
         let joint = &self.limits.joints[i];
         let left = self.way_to_stop(i, self.input.target_position[i], self.input.current_position[i]) - UNSEEN;
-        let (stopping, reaction) = (FALLING * joint.stopping(), reaction(joint, period_s) + f64::from(ANEW) * period_s);
+        let (stopping, reaction) =
+            (FALLING * joint.stopping(), reaction(joint, period_s) + f64::from(PERIODS_PER_SPEED_LIMIT) * period_s);
         let loss = joint.velocity_offset + stopping * reaction;
         let room = 2.0 * stopping * left - joint.velocity_offset * joint.velocity_offset;
         // 0 where it is no number, of a joint without stops.
@@ -168,7 +169,7 @@ impl Follower {
     /// A period on: where the joints are to be then. `None` where no way is found.
     pub fn step(&mut self) -> Option<Joints> {
         self.periods += 1;
-        if self.periods >= ANEW && matches!(self.ahead, LookAhead::Stop(_)) {
+        if self.periods >= PERIODS_PER_SPEED_LIMIT && matches!(self.ahead, LookAhead::Stop(_)) {
             self.set_speeds();
         }
         if !self.goes_on() {

@@ -57,7 +57,7 @@ pub(crate) struct ArticulatedVerb {
 }
 
 /// What every folder of this command holds, and appears last.
-const LAST: &str = "articulated.json";
+const LAST_FILE: &str = "articulated.json";
 /// What is in a folder that `twin reconstruct object` has made.
 const OBJECT: [&str; 3] = ["object.json", "object_fine.obj", "splats.ply"];
 /// Nodes along each edge of the grid of a scan, were it a cube.
@@ -89,7 +89,7 @@ struct ObjectScale {
 impl ArticulatedVerb {
     pub(super) fn run(&self) -> anyhow::Result<()> {
         ctrlc::set_handler(ending::ask).context("cannot listen for Ctrl-C")?;
-        let folder = self.outputs.folder(LAST)?;
+        let folder = self.outputs.folder(LAST_FILE)?;
         let first = self.given(&self.first, "first")?;
         let (object, splats, kept) = match (&self.second, &self.marks) {
             (Some(second), _) => {
@@ -118,7 +118,7 @@ impl ArticulatedVerb {
             write_splats(&object, splats, &frames, &folder)?;
         }
         ensure!(!ending::asked(), "interrupted");
-        folder.finish(LAST)?;
+        folder.finish(LAST_FILE)?;
         kept.iter().flatten().try_for_each(|kept| object::forget(kept))?;
         let summary = ArticulatedSummary::of(&object, &labels);
         for remark in &summary.remarks {

@@ -18,7 +18,7 @@ const SWEEPS: usize = 80;
 const SETTLED: f64 = 1e-6;
 /// Sweeps after which equations take up what they have found; again after twice as many, and so on, so that where no
 /// answer of equations holds the sweeps get there.
-const SLOW: usize = 3;
+const SWEEPS_BEFORE_EQUATIONS: usize = 3;
 /// Sweeps end where the change of velocity is still this share of what it was when equations were last asked: a body that
 /// a tool pins to the table is pressed a little harder by every sweep, and moves no more.
 const HARDLY: f64 = 0.9;
@@ -171,8 +171,8 @@ impl<'a, const N: usize> Impulses<'a, N> {
             if largest < SETTLED {
                 break;
             }
-            if sweep % SLOW == 0 && (sweep / SLOW).is_power_of_two() {
-                if sweep > 2 * SLOW && largest > HARDLY * before {
+            if sweep % SWEEPS_BEFORE_EQUATIONS == 0 && (sweep / SWEEPS_BEFORE_EQUATIONS).is_power_of_two() {
+                if sweep > 2 * SWEEPS_BEFORE_EQUATIONS && largest > HARDLY * before {
                     break;
                 }
                 before = largest;

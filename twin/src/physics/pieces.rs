@@ -10,7 +10,7 @@ const RESOLUTION: u32 = 96;
 /// A piece is cut while its hull is larger than it by more than this [share of the volume].
 const CONCAVITY: f64 = 0.002;
 /// Pieces at most.
-const MOST: u32 = 64;
+const MAX_PIECES: u32 = 64;
 
 /// Corners [m] and triangles of one convex piece.
 pub type Piece = (Vec<Point3<f64>>, Vec<[u32; 3]>);
@@ -21,7 +21,7 @@ pub fn convex_pieces(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<Piec
     let parameters = VHACDParameters {
         resolution: RESOLUTION,
         concavity: CONCAVITY,
-        max_convex_hulls: MOST,
+        max_convex_hulls: MAX_PIECES,
         ..VHACDParameters::default()
     };
     let decomposed = VHACD::decompose(&parameters, &points, triangles, true);

@@ -13,15 +13,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// How far points may be apart to be a pair, at first and at last [m].
 const GATE: [f64; 2] = [0.12, 0.012];
 /// Steps while the gate closes, and at the end with many points.
-const STEPS: usize = 40;
-const LAST: usize = 12;
+const GATED_STEPS: usize = 40;
+const LAST_STEPS: usize = 12;
 /// Points that are paired while the best start is looked for, and afterwards.
-const FEW: usize = 1500;
-const MANY: usize = 10_000;
+const SEARCH_POINTS: usize = 1500;
+const FIT_POINTS: usize = 10_000;
 /// The robot's surface counts as seen where the scan has a point this near [m].
-const SEEN: f64 = 0.01;
+const SEEN_WITHIN: f64 = 0.01;
 /// Below this share of the surface nothing was found. Inner sides and the far side are never seen.
-const LEAST: f64 = 0.2;
+const MIN_SEEN_SHARE: f64 = 0.2;
 /// What else is tried beside the start: larger and smaller, and turned about each axis [rad].
 const SCALES: [f64; 3] = [1.0, 0.87, 1.15];
 const TURN: f64 = 0.25;
@@ -91,15 +91,15 @@ pub fn align(
     let done = AtomicUsize::new(0);
     let best = (starts.par_iter())
         .map(|start| {
-            let end = pair.settle(*start, FEW, &GATE, STEPS);
+            let end = pair.settle(*start, SEARCH_POINTS, &GATE, GATED_STEPS);
             tried(done.fetch_add(1, Ordering::Relaxed) + 1);
-            (pair.quality(&end, FEW).0, end)
+            (pair.quality(&end, SEARCH_POINTS).0, end)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0));
     let (_, best) = best.ok_or(AlignError::Empty(0))?;
-    let base_from_scan = pair.settle(best, MANY, &[2.0 * GATE[1], GATE[1]], LAST);
-    let (seen, rms) = pair.quality(&base_from_scan, MANY);
-    if seen < LEAST { Err(AlignError::Apart(seen)) } else { Ok(Alignment { base_from_scan, seen, rms }) }
+    let base_from_scan = pair.settle(best, FIT_POINTS, &[2.0 * GATE[1], GATE[1]], LAST_STEPS);
+    let (seen, rms) = pair.quality(&base_from_scan, FIT_POINTS);
+    if seen < MIN_SEEN_SHARE { Err(AlignError::Apart(seen)) } else { Ok(Alignment { base_from_scan, seen, rms }) }
 }
 
 struct Pair<'a> {
@@ -173,7 +173,7 @@ impl Pair<'_> {
         let offs: Vec<f64> = numbers
             .filter_map(|number| {
                 let (to, normal) = (self.robot.points[number], self.robot.normals[number]);
-                let (_, i) = self.scanned.one(&(back * to), SEEN / at.scaling())?;
+                let (_, i) = self.scanned.one(&(back * to), SEEN_WITHIN / at.scaling())?;
                 Some(normal.dot(&(at * self.scan[i] - to)))
             })
             .collect();

@@ -8,10 +8,10 @@ use shared_mem::statistics::median;
 const FAINT: f32 = 0.3;
 /// So far around a link's box a splat is still the link's [m]: a scan's haze and cables; an outline without the maker's
 /// shapes is only about where the arm is.
-const AROUND: f64 = 0.05;
-const AROUND_OUTLINE: f64 = 0.15;
+const BESIDE_LINK: f64 = 0.05;
+const BESIDE_OUTLINE: f64 = 0.15;
 /// Share of splats elsewhere from which on it is said.
-const MANY: f64 = 0.25;
+const MISPLACED_SHARE: f64 = 0.25;
 
 /// One sentence for every scan most of whose splats are not where its link is.
 pub(crate) fn misplaced(robot: &RobotSurface, scans: &[ScannedLink], in_base: bool) -> Vec<String> {
@@ -20,7 +20,7 @@ pub(crate) fn misplaced(robot: &RobotSurface, scans: &[ScannedLink], in_base: bo
 
 fn remark(robot: &RobotSurface, scan: &ScannedLink, in_base: bool) -> Option<String> {
     let (low, high) = bounds(robot, scan.link)?;
-    let around = if robot.is_measured() { AROUND } else { AROUND_OUTLINE };
+    let around = if robot.is_measured() { BESIDE_LINK } else { BESIDE_OUTLINE };
     let clear = scan.splats.splats.iter().filter(|splat| splat.opacity >= FAINT);
     let away = clear.map(|splat| {
         let at = scan.link_from_scan * splat.centre.cast::<f64>();
@@ -30,7 +30,7 @@ fn remark(robot: &RobotSurface, scan: &ScannedLink, in_base: bool) -> Option<Str
     let away: Vec<f64> = away.collect();
     let elsewhere = away.iter().filter(|distance| **distance > around).count();
     let middle = median(away.iter().copied())?;
-    if (elsewhere as f64) < MANY * away.len() as f64 {
+    if (elsewhere as f64) < MISPLACED_SHARE * away.len() as f64 {
         return None;
     }
     let remedy = if in_base {

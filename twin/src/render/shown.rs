@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Vector3};
 use splat::{Lens, Picture, SplatCloud, Surroundings};
 
 /// Numbers in the picture: what never moves, the objects, and the robot's links from here on.
-const STILL: u32 = 1;
+const UNMOVED: u32 = 1;
 const OBJECT: u32 = 2;
 const ROBOT: u32 = 3;
 
@@ -59,7 +59,7 @@ impl Shown {
         let parts =
             robot.parts().iter().zip(robot.links()).enumerate().filter(|(_, (_, link))| meshes || *link == tool);
         let number = |link: usize| ROBOT + link as u32;
-        let (places, models) = (still.into_iter().map(|model| (Place::Still, (model, STILL))))
+        let (places, models) = (still.into_iter().map(|model| (Place::Still, (model, UNMOVED))))
             .chain(objects.into_iter().enumerate().map(|(i, model)| (Place::Object(i), (model, OBJECT))))
             .chain(parts.map(|(part, (mesh, link))| (Place::Part(part), (Model::Mesh(mesh.clone()), number(link)))))
             .chain(scans.into_iter().map(|ScannedLink { link, link_from_scan, splats }| {

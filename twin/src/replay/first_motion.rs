@@ -18,7 +18,7 @@ const FIRST_POSES: usize = 10;
 /// Poses of a flight that count: beyond, a start that is known to a hundredth of the noise gains nothing.
 const MOST_POSES: usize = 100;
 /// Steps of the fit to rotations.
-const STEPS: usize = 4;
+const FIT_STEPS: usize = 4;
 /// Longest step of the free rotation [s].
 const LONGEST: f64 = 0.01;
 /// Difference steps of the fit: of the rotation [rad] and of the angular velocity [rad/s].
@@ -92,7 +92,7 @@ impl Rotation {
             DVector::from_vec(left.flat_map(|left| [left.x, left.y, left.z]).collect())
         };
         let mut residuals = left(&self);
-        for _ in 0..STEPS {
+        for _ in 0..FIT_STEPS {
             let mut slopes = DMatrix::zeros(residuals.len(), 6);
             for k in 0..6 {
                 let step = DIFFERENCES[k / 3];

@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 use shared_mem::cell::Table;
 
 /// An object so far off the table is not there by a tracker's noise [m].
-const OFF: f64 = 5e-3;
+const OFF_TABLE: f64 = 5e-3;
 
 /// How far the poses put an object's lowest point below the table [m]; negative above it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,7 +39,7 @@ impl Depth {
 
     /// Whether the object is inside the table by more than noise.
     pub(super) fn is_inside(&self) -> bool {
-        self.lowest > OFF
+        self.lowest > OFF_TABLE
     }
 
     /// The remark about an object that should stand on the table and was set onto it.
@@ -54,10 +54,10 @@ impl Depth {
                 self.lowest.abs() * 1e3
             )
         };
-        if self.middle > OFF {
+        if self.middle > OFF_TABLE {
             return Err(Buried(*self));
         }
-        let remark = if self.is_inside() { Some("into") } else { (self.lowest < -OFF).then_some("above") };
+        let remark = if self.is_inside() { Some("into") } else { (self.lowest < -OFF_TABLE).then_some("above") };
         Ok(remark.map(sentence))
     }
 }

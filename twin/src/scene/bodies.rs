@@ -11,7 +11,7 @@ use std::path::Path;
 /// Sides of a drawn and simulated cylinder.
 const SIDES: u32 = 24;
 /// Steps over a joint's range in which its highest place is looked for.
-const STEPS: u32 = 16;
+const RANGE_STEPS: u32 = 16;
 
 #[derive(Debug, Clone)]
 pub struct CellBody {
@@ -151,10 +151,10 @@ pub fn tallest(cell: &Cell) -> Result<f64, MeshFileError> {
         let moved = own
             .iter()
             .filter_map(|body| Some((body.link.as_ref()?.link.as_str(), body.link.as_ref()?.joint.as_ref()?)));
-        let moved = moved.flat_map(|(name, joint)| (0..=STEPS).map(move |k| (name, joint, k)));
+        let moved = moved.flat_map(|(name, joint)| (0..=RANGE_STEPS).map(move |k| (name, joint, k)));
         let highest = moved.map(|(name, joint, k)| {
             let [low, high] = joint.limits;
-            let there = low + (high - low) * f64::from(k) / f64::from(STEPS);
+            let there = low + (high - low) * f64::from(k) / f64::from(RANGE_STEPS);
             heights(&own, &poses_in_root(&own, |link| if link.link == name { there } else { start_of(object, link) }))
                 [1]
         });

@@ -18,11 +18,11 @@ use shared_mem::time::TICK;
 /// A gap that is wider than this plus a period's approach stays open for the period [m].
 const MARGIN: f64 = 1e-3;
 /// Longest step between two looks at the gap, but for one in which half of it could close [s].
-const LOOK: f64 = 2.5e-4;
+const LONGEST_STEP: f64 = 2.5e-4;
 /// A step that closes the gap goes on for so long, so that it ends in touch [s].
-const INTO: f64 = 2e-7;
+const STEP_INTO_TOUCH: f64 = 2e-7;
 /// Nothing closes a gap of this width within a millisecond [m].
-const NEAR: f64 = 0.02;
+const UNCLOSABLE_GAP: f64 = 0.02;
 /// Tool and object that do not touch gain no more speed of approach than this in a second [m/s²]: far more than an arm's
 /// torques or a table give them.
 const SURGE: f64 = 500.0;
@@ -166,7 +166,7 @@ impl ToolContact {
         let on_tool = held.inverse_transform_point(&centre);
         let nearest = Point3::new(0.0, 0.0, on_tool.z.clamp(0.0, tool.segment));
         let mut gap = (on_tool - nearest).norm() - tool.radius - object.bounding_radius();
-        if gap <= NEAR {
+        if gap <= UNCLOSABLE_GAP {
             let touch = object.touch(tool, &held);
             let moving = ToolMotion::from(flange);
             let approach = (moving.velocity_at(&touch.point) - object.velocity_at(&touch.point)).norm();
@@ -215,7 +215,7 @@ struct Close<'a> {
 impl Close<'_> {
     /// Follows the tool along its path, `since` seconds after `now_ns`.
     fn follow(&mut self, path: &mut ToolPath, now_ns: u64, since: f64) {
-        while path.left() > INTO {
+        while path.left() > STEP_INTO_TOUCH {
             let tool = path.now();
             let touches = self.object.touches(self.tool, &self.contact.held(&tool.pose));
             if touches.iter().all(|touch| touch.depth <= 0.0) {
@@ -237,8 +237,8 @@ impl Close<'_> {
     fn until_touch(&self, tool: &ToolMotion, nearest: &Touch, left: f64) -> f64 {
         let approach = tool.velocity_at(&nearest.point) - self.object.velocity_at(&nearest.point);
         let (gap, closing) = (-nearest.depth, approach.dot(&nearest.normal));
-        let open = if closing > 0.0 { gap / closing + INTO } else { f64::INFINITY };
-        open.min(LOOK.max(0.5 * gap / approach.norm())).min(left)
+        let open = if closing > 0.0 { gap / closing + STEP_INTO_TOUCH } else { f64::INFINITY };
+        open.min(LONGEST_STEP.max(0.5 * gap / approach.norm())).min(left)
     }
 
     /// One step in touch.

@@ -13,7 +13,7 @@ pub(super) struct Hull {
 }
 
 /// Corners nearer to each other than this are one [m]: meshes carry rounding noise.
-const SAME: f64 = 1e-7;
+const SAME_CORNER: f64 = 1e-7;
 
 impl Hull {
     /// The hull; `None` when the points span no area. Of a round base, which has more corners than fit, those that lie
@@ -31,11 +31,11 @@ impl Hull {
             *hull.corners.get_mut(hull.count)? = corner;
             hull.count += 1;
             corner = next(corner, points.clone())?;
-            if (corner - start).norm() < SAME {
+            if (corner - start).norm() < SAME_CORNER {
                 break;
             }
         }
-        (hull.count >= 3 && hull.area() > SAME * SAME).then_some(hull)
+        (hull.count >= 3 && hull.area() > SAME_CORNER * SAME_CORNER).then_some(hull)
     }
 
     pub(super) fn corners(&self) -> &[Vector2<f64>] {
@@ -78,10 +78,10 @@ fn outermost(points: impl Iterator<Item = Vector2<f64>> + Clone) -> Option<[Vect
 
 /// The point that has all others on the left of the line from `from`; of several on that line the farthest.
 fn next(from: Vector2<f64>, points: impl Iterator<Item = Vector2<f64>>) -> Option<Vector2<f64>> {
-    points.filter(|p| (p - from).norm() >= SAME).reduce(|best, p| {
+    points.filter(|p| (p - from).norm() >= SAME_CORNER).reduce(|best, p| {
         let (to_best, to_point) = (best - from, p - from);
         let side = to_best.perp(&to_point);
-        let straight = SAME * to_best.norm().max(to_point.norm());
+        let straight = SAME_CORNER * to_best.norm().max(to_point.norm());
         let farther = side.abs() <= straight && to_point.norm() > to_best.norm() && to_best.dot(&to_point) > 0.0;
         if side < -straight || farther { p } else { best }
     })

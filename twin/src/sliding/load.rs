@@ -51,7 +51,7 @@ pub(super) type Loads<const N: usize> = [f64; N];
 pub(super) type Kappas<const N: usize> = [Vector2<f64>; N];
 
 /// Rounds of dropping the places that would pull; each patch seen so far needs at most four.
-const ROUNDS: usize = 12;
+const DROPS: usize = 12;
 /// Relative volume below which three equations do not determine the pressure: it all stands on one line.
 const SINGULAR: f64 = 1e-9;
 
@@ -86,7 +86,7 @@ fn balance<const N: usize>(places: &Places<'_, N>, wrench: &Wrench, levers: &[Ve
     }
     let demand = Vector3::new(1.0, wrench.moment.y / weight, -wrench.moment.x / weight);
     let mut carrying = *places.shares;
-    for _ in 0..ROUNDS {
+    for _ in 0..DROPS {
         let pressure = pressure_on(places.points, &carrying, demand, levers)?;
         let (mut loads, mut settled) = ([0.0; N], true);
         for i in 0..N {

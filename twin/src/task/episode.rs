@@ -12,7 +12,7 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 
 /// A body whose fastest point is slower than this is at rest [m/s], once it has been for so long [s].
-const STILL: f64 = 1e-4;
+const REST_SPEED: f64 = 1e-4;
 const STILL_FOR: f64 = 0.1;
 
 /// Steps from one row of a recording to the next.
@@ -219,7 +219,7 @@ impl Course {
     /// A step was done.
     pub(super) fn count(&mut self, task: &Task, world: &World) {
         self.done += 1;
-        if (0..task.bodies.len()).any(|body| world.speed(body) > STILL) {
+        if (0..task.bodies.len()).any(|body| world.speed(body) > REST_SPEED) {
             self.moved = self.done;
         }
         if !task.conditions.iter().all(|condition| condition.holds(world)) {

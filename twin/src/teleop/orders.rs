@@ -6,7 +6,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// Most inputs that wait. A page on which everything is held down sends some thirty a second.
-pub(super) const MOST: usize = 64;
+pub(super) const MAX_WAITING: usize = 64;
 
 /// What the thread that steers is to do.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +61,7 @@ impl Orders {
     /// Leaves an input; `false` where as many wait as may, and it is left out.
     pub(super) fn ask(&self, input: Input) -> bool {
         let mut waiting = self.waiting();
-        if waiting.inputs.len() >= MOST {
+        if waiting.inputs.len() >= MAX_WAITING {
             return false;
         }
         waiting.inputs.push_back(input);
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn a_stop_goes_before_all_that_waits_and_voids_it() {
         let (orders, now) = (Orders::default(), Instant::now());
-        assert!((0..MOST as u64).all(|id| orders.ask(input(id))));
+        assert!((0..MAX_WAITING as u64).all(|id| orders.ask(input(id))));
         assert!(!orders.ask(input(99)), "no more wait than may");
         assert_eq!(orders.next(now, Awaited::Halts), None);
         assert_eq!(orders.next(now, Awaited::Any), Some(Order::Input(input(0))));

@@ -25,7 +25,7 @@ use tokio::time::MissedTickBehavior;
 /// The page. Nothing else is fetched.
 const PAGE: &str = include_str!("page.html");
 /// Most pages at once.
-const MOST: usize = 8;
+const MAX_PAGES: usize = 8;
 /// Longest message of a page [bytes].
 const LONGEST: usize = 16 * 1024;
 /// Most messages of a page that are heard from one picture to the next; what is more waits at the page. A page that sends as fast as
@@ -38,7 +38,7 @@ const UNANSWERED: u32 = 5;
 /// The same of one that takes nothing for so long.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
 /// How often it is looked whether to end.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_PERIOD: Duration = Duration::from_millis(50);
 
 /// Where the page is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -141,7 +141,7 @@ pub fn serve(
 
 async fn asked(stop: &AtomicBool) {
     while !stop.load(Ordering::Relaxed) {
-        tokio::time::sleep(LOOK).await;
+        tokio::time::sleep(POLL_PERIOD).await;
     }
 }
 
@@ -159,7 +159,7 @@ async fn gate(State(shared): State<Shared>, request: Request, next: Next) -> Res
 }
 
 async fn upgrade(State(shared): State<Shared>, socket: WebSocketUpgrade) -> Response {
-    let Some(seat) = shared.seats.take(MOST) else {
+    let Some(seat) = shared.seats.take(MAX_PAGES) else {
         return (StatusCode::SERVICE_UNAVAILABLE, "too many pages are open; close one of them").into_response();
     };
     // The seat goes along: where the connection fails before it is a page's, it is dropped with what was to come.

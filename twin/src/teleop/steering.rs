@@ -1,7 +1,7 @@
 //! The thread that simulates, draws and records: one episode after the other, fifty pictures a second.
 
 use super::message::{EpisodeEntry, FingersEntry, Hello, Input, State, frame};
-use super::orders::{Awaited, MOST, Order, Orders};
+use super::orders::{Awaited, MAX_WAITING, Order, Orders};
 use crate::task::{Jog, SteerError, Steered, Task, TaskCamera, TaskView};
 use crate::world::STEP;
 use serde::Serialize;
@@ -140,10 +140,10 @@ impl Steering {
     /// as they can hold up neither the others nor the end. A stop is taken in at any time.
     fn take_in(&mut self, orders: &Orders, until: Instant, stop: &AtomicBool) {
         let (mut taken, mut awaited) = (0, Awaited::Any);
-        while !stop.load(Ordering::Relaxed) && (taken < MOST || Instant::now() < until) {
+        while !stop.load(Ordering::Relaxed) && (taken < MAX_WAITING || Instant::now() < until) {
             let Some(order) = orders.next(until, awaited) else { return };
             taken += 1;
-            if self.take(&order) || taken >= MOST {
+            if self.take(&order) || taken >= MAX_WAITING {
                 awaited = Awaited::Halts;
             }
         }

@@ -4,14 +4,14 @@
 //!
 //! | bound | why |
 //! |---|---|
-//! | [`MOST`] viewers | each costs memory for what it has not read yet |
+//! | [`MAX_VIEWERS`] viewers | each costs memory for what it has not read yet |
 //! | [`PATIENCE`] without reading | a stuck tab gives its place back |
 //! | `Host` and `Origin` | any web page that a browser on this machine shows may open a socket here: it would see the laboratory |
 //!
 //! The server behind it listens at an address of the loopback that is drawn at each start, so that no web page finds it
 //! past this check. Programs on this machine can; they could read shared memory as well.
 
-use super::request::{MOST, Refusal, check};
+use super::request::{MAX_VIEWERS, Refusal, check};
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher as _, RandomState};
 use std::io::{self, ErrorKind, Read as _, Write as _};
@@ -29,7 +29,7 @@ const LONGEST: usize = 8192;
 /// Connections at a time whose request is still read, beside the viewers. One more is closed at once.
 const CALLERS: usize = 16;
 /// How often new connections are looked for.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_PERIOD: Duration = Duration::from_millis(20);
 /// Of refused viewers, one in this time is named in the log.
 const QUIET: Duration = Duration::from_secs(10);
 
@@ -110,7 +110,7 @@ fn listen_for(listener: &TcpListener, shared: &Arc<Shared>) {
             Ok(_) => {
                 shared.callers.fetch_sub(1, Ordering::Relaxed);
             }
-            Err(_) => thread::sleep(LOOK),
+            Err(_) => thread::sleep(POLL_PERIOD),
         }
     }
 }
@@ -147,7 +147,7 @@ impl Shared {
         if self.stop.load(Ordering::Relaxed) {
             return Err(Refusal::Broken);
         }
-        if viewers.len() >= MOST {
+        if viewers.len() >= MAX_VIEWERS {
             return Err(Refusal::Full);
         }
         viewers.insert(from, caller.try_clone()?);

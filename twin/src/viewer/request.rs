@@ -12,7 +12,7 @@ const HOSTED: [&str; 3] = ["app.foxglove.dev", "studio.foxglove.dev", "lichtblic
 const INSTALLED: [&str; 4] = ["file", "app", "foxglove", "lichtblick"];
 
 /// Viewers at a time.
-pub(super) const MOST: usize = 4;
+pub(super) const MAX_VIEWERS: usize = 4;
 /// Longest part of a name that is repeated to a person.
 const SHOWN: usize = 80;
 
@@ -34,7 +34,7 @@ pub(super) enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Full => write!(f, "{} are connected already; close one of them", MOST),
+            Self::Full => write!(f, "{} are connected already; close one of them", MAX_VIEWERS),
             Self::Page(origin) => write!(
                 f,
                 "it is a page of {origin}; open the viewer at app.foxglove.dev, as an installed program, or from a server on this machine"

@@ -2,7 +2,7 @@
 
 use super::front::Front;
 use super::open;
-use super::request::MOST;
+use super::request::MAX_VIEWERS;
 use super::test_client::{LONG, connect, say};
 use foxglove::{ChannelBuilder, Context, RawChannel, WebSocketServer, WebSocketServerHandle};
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -72,7 +72,7 @@ fn resident() -> usize {
 #[test]
 fn viewers_that_do_not_read_cost_little_and_disturb_nobody() {
     let shown = shown(LONG);
-    let stuck: Vec<TcpStream> = (0..MOST - 1).map(|_| shown.viewer()).collect();
+    let stuck: Vec<TcpStream> = (0..MAX_VIEWERS - 1).map(|_| shown.viewer()).collect();
     let mut reads = shown.viewer();
     until(|| shown.channel.has_sinks());
     let before = resident();
@@ -100,7 +100,7 @@ fn viewers_that_do_not_read_cost_little_and_disturb_nobody() {
     assert!(reader.join().expect("it does not panic") >= 20 * MESSAGE, "the one that reads is served");
     assert!(most < 400 << 20, "{} MB for viewers that do not read", most >> 20);
     // The one that read has left.
-    assert!(shown.front.viewers() >= MOST - 1);
+    assert!(shown.front.viewers() >= MAX_VIEWERS - 1);
     let Shown { front, server, context, .. } = shown;
     drop(front);
     server.stop().wait_blocking();
@@ -110,29 +110,29 @@ fn viewers_that_do_not_read_cost_little_and_disturb_nobody() {
 #[test]
 fn one_viewer_too_many_is_refused_and_finds_a_place_when_another_has_left() {
     let shown = shown(LONG);
-    let mut viewers: Vec<TcpStream> = (0..MOST).map(|_| shown.viewer()).collect();
-    shown.wait_for(MOST);
+    let mut viewers: Vec<TcpStream> = (0..MAX_VIEWERS).map(|_| shown.viewer()).collect();
+    shown.wait_for(MAX_VIEWERS);
     let (mut refused, status) = shown.connect("file://");
     assert_eq!(status, "HTTP/1.1 503 Service Unavailable");
     let mut text = String::new();
     refused.read_to_string(&mut text).expect("the reason, and the end");
     assert!(text.contains("close one of them"), "{text}");
     drop(viewers.pop());
-    shown.wait_for(MOST - 1);
+    shown.wait_for(MAX_VIEWERS - 1);
     viewers.push(shown.viewer());
-    shown.wait_for(MOST);
-    until(|| shown.server.client_count() == MOST);
+    shown.wait_for(MAX_VIEWERS);
+    until(|| shown.server.client_count() == MAX_VIEWERS);
 }
 
 #[test]
 fn a_page_of_somebody_else_sees_nothing_and_takes_no_place() {
     let shown = shown(LONG);
-    for _ in 0..2 * MOST {
+    for _ in 0..2 * MAX_VIEWERS {
         assert_eq!(shown.connect("https://example.org").1, "HTTP/1.1 403 Forbidden");
     }
     // Nor do connections that say nothing, or something else.
     let silent: Vec<TcpStream> =
-        (0..MOST).map(|_| TcpStream::connect(shown.front.address()).expect("it listens")).collect();
+        (0..MAX_VIEWERS).map(|_| TcpStream::connect(shown.front.address()).expect("it listens")).collect();
     let mut other = TcpStream::connect(shown.front.address()).expect("it listens");
     other.write_all(b"GET /etc/passwd HTTP/1.1\r\nHost: localhost\r\n\r\n").expect("it reads");
     other.set_read_timeout(Some(LONG)).expect("a timeout above zero");
@@ -148,7 +148,7 @@ fn a_page_of_somebody_else_sees_nothing_and_takes_no_place() {
 #[test]
 fn a_viewer_that_reads_nothing_any_more_gives_its_place_back() {
     let shown = shown(Duration::from_millis(200));
-    let stuck: Vec<TcpStream> = (0..MOST).map(|_| shown.viewer()).collect();
+    let stuck: Vec<TcpStream> = (0..MAX_VIEWERS).map(|_| shown.viewer()).collect();
     until(|| shown.channel.has_sinks());
     let message = vec![7; MESSAGE];
     until(|| {

@@ -55,9 +55,9 @@ use tree::Trees;
 pub const STEP: f64 = TICK;
 /// Sweeps over all patches and joints, and the change of velocity [m/s] below which they end early.
 const SWEEPS: usize = 60;
-const ENOUGH: f64 = 1e-7;
+const CONVERGED: f64 = 1e-7;
 /// Pieces nearer than this are looked at [m], and as much more as they may come nearer in a step.
-const NEAR: f64 = 5e-4;
+const NEAR_PIECES: f64 = 5e-4;
 /// Bodies that overlap by more than this cannot start there [m].
 const OVERLAP: f64 = 1e-4;
 
@@ -163,7 +163,7 @@ impl World {
             for rail in rails.iter_mut() {
                 largest = largest.max(rail.relax(trees, STEP));
             }
-            if largest < ENOUGH {
+            if largest < CONVERGED {
                 break;
             }
         }
@@ -315,7 +315,7 @@ impl World {
         for i in 0..self.pairs.len() {
             let PiecePair { pieces, mut found_by, .. } = self.pairs[i];
             let [first, second] = pieces.map(|piece| self.pieces[piece].body);
-            let within = NEAR + STEP * (self.bodies[first].speed + self.bodies[second].speed);
+            let within = NEAR_PIECES + STEP * (self.bodies[first].speed + self.bodies[second].speed);
             let found = self.touching(pieces, within, &mut found_by);
             let pair = &mut self.pairs[i];
             pair.found_by = found_by;

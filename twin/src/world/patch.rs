@@ -23,7 +23,7 @@ const GIVE: f64 = 1e-9;
 /// The same of a patch that holds fast: bodies with few freedoms cannot answer to everything.
 const STIFF: f64 = 1e-9;
 /// Places that lay nearer than this to each other a step ago are one [m].
-const SAME: f64 = 3e-3;
+const SAME_PLACE: f64 = 3e-3;
 /// Places all nearer to their middle than this are one, which friction does not keep from turning [m].
 const LINE: f64 = 1e-5;
 /// Changes of the set of places that press, at most [1].
@@ -127,7 +127,7 @@ impl Patch {
             let distance = |known: &&(Point3<f64>, f64, Vector3<f64>)| (known.0 - place.at).norm_squared();
             let before = known
                 .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-                .filter(|known| distance(known) < SAME * SAME)
+                .filter(|known| distance(known) < SAME_PLACE * SAME_PLACE)
                 .map_or((0.0, Vector2::zeros()), |(_, load, tangential)| (*load, (axes * tangential).xy()));
             *spot = Spot { x: from.x, y: from.y, parting, load: before.0, tangential: before.1, ..none };
         }

@@ -8,7 +8,7 @@ use quick_xml::{Reader, XmlVersion};
 /// Elements within elements. A body for each link of a chain of 64 joints, each within the one before, stays below.
 const DEEPEST: usize = 256;
 /// Elements of a document. A scene of a thousand bodies has some ten thousand.
-const MOST: usize = 1_000_000;
+const MAX_ELEMENTS: usize = 1_000_000;
 
 /// An element with what is in it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -58,15 +58,17 @@ impl Element {
             match reader.read_event().map_err(|error| fault(format!("this is no XML ({error})")))? {
                 Event::Start(start) => {
                     count += 1;
-                    if open.len() >= DEEPEST || count > MOST {
-                        return Err(fault(format!("more than {DEEPEST} elements in each other, or {MOST} in all")));
+                    if open.len() >= DEEPEST || count > MAX_ELEMENTS {
+                        return Err(fault(format!(
+                            "more than {DEEPEST} elements in each other, or {MAX_ELEMENTS} in all"
+                        )));
                     }
                     open.push(element(&start).map_err(fault)?);
                 }
                 Event::Empty(start) => {
                     count += 1;
-                    if count > MOST {
-                        return Err(fault(format!("more than {MOST} elements")));
+                    if count > MAX_ELEMENTS {
+                        return Err(fault(format!("more than {MAX_ELEMENTS} elements")));
                     }
                     let read = element(&start).map_err(fault)?;
                     done(&mut open, read);

@@ -14,7 +14,7 @@ use std::collections::HashSet;
 const DEEPEST: usize = 64;
 
 /// Links, and joints. An arm with two hands has some 60; who walks the chain compares each with each.
-const MOST: usize = 4096;
+const MAX_PARTS: usize = 4096;
 
 pub(crate) fn read(text: &str) -> Result<Robot, UrdfError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -116,8 +116,8 @@ impl Tree {
             (None, "robot") if !self.found => self.robot(&Tag::new(start, name)?),
             (None, "robot") => return Err("a second <robot>".into()),
             (None, _) => return Err(format!("<{}> stands where <robot> must", quoted(name))),
-            (Some(Open::Robot), "link") if links == MOST => return Err(format!("more than {MOST} links")),
-            (Some(Open::Robot), "joint") if joints == MOST => return Err(format!("more than {MOST} joints")),
+            (Some(Open::Robot), "link") if links == MAX_PARTS => return Err(format!("more than {MAX_PARTS} links")),
+            (Some(Open::Robot), "joint") if joints == MAX_PARTS => return Err(format!("more than {MAX_PARTS} joints")),
             (Some(Open::Robot), "link") => {
                 let name = self.unused(0, Tag::new(start, name)?.label("name")?, "link")?;
                 Open::Link { name, line: self.line, inertial: None, collisions: Vec::new() }

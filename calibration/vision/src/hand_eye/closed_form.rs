@@ -18,7 +18,7 @@ const LEVER: f64 = 0.5;
 /// How many times further off than the middle picture one is that fits no other. The rest is left to the likelihood.
 const ASTRAY: f64 = 8.0;
 /// Distances below this count as this: noise is no outlier [m].
-const SMALL: f64 = 2e-3;
+const NOISE: f64 = 2e-3;
 
 /// The camera's mount from all pairs of pictures; `None` where no two turn against each other.
 pub fn mount(pictures: &[&Pair]) -> Option<Isometry3<f64>> {
@@ -94,7 +94,7 @@ pub fn start(mount_kind: Mount, pictures: &[Pair]) -> Option<(Chain, Vec<bool>)>
         }
     }
     let (median, off) = best?;
-    let fits: Vec<bool> = off.iter().map(|off| *off <= ASTRAY * median.max(SMALL)).collect();
+    let fits: Vec<bool> = off.iter().map(|off| *off <= ASTRAY * median.max(NOISE)).collect();
     let used: Vec<&Pair> = pictures.iter().zip(&fits).filter(|(_, fits)| **fits).map(|(pair, _)| pair).collect();
     let camera = mount(&used)?;
     let board = middle(&used.iter().map(|pair| board_by(pair, &camera)).collect::<Vec<_>>());

@@ -24,7 +24,7 @@ pub struct Options {
 /// An arm whose poses are off by more than this is not that of the pictures [m].
 const ARM_OFF: f64 = 3e-3;
 /// Fewer pictures than this are few.
-const MANY: usize = 8;
+const FEW_PICTURES: usize = 8;
 
 /// Finds the mount, and writes it where it is identified.
 ///
@@ -96,7 +96,7 @@ fn view_answer(view: &View, judged: &Judged) -> ViewAnswer {
 fn warnings(found: &Fit, without_board: &[String]) -> Vec<String> {
     let mut out = Vec::new();
     let used = found.views.iter().filter(|view| view.used).count();
-    if used < MANY {
+    if used < FEW_PICTURES {
         out.push(format!("{used} pictures are few: ten to twenty from different sides make the intervals narrower"));
     }
     if found.arm.position > ARM_OFF {

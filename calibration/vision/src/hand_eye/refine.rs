@@ -32,7 +32,7 @@ pub struct Refined {
     pub observations: Vec<Observation>,
 }
 
-const STEPS: usize = 40;
+const MAX_STEPS: usize = 40;
 /// A step less than this is none, in sigmas.
 const ARRIVED: f64 = 1e-4;
 /// Where the search for the arm's error begins.
@@ -63,7 +63,7 @@ pub fn refined(pictures: &[&Prepared<'_>], start: &Chain, pixel: f64) -> Option<
     let mut chain = *start;
     let mut errors: Vec<Vector6<f64>> = pictures.iter().map(|p| chain.error_of(&p.link, &p.board)).collect();
     let mut sigma = START;
-    for round in 0..STEPS {
+    for round in 0..MAX_STEPS {
         let observed = pictures.iter().zip(&errors).map(|(p, error)| p.observation(&chain, error, pixel));
         let observations = observed.collect::<Option<Vec<_>>>()?;
         sigma = sigma.most_likely(&observations);

@@ -21,7 +21,7 @@ pub struct View {
 /// Residuals beyond so many sigmas count less, and beyond nothing but this share of them (Huber 1964).
 const HUBER: f64 = 2.5;
 /// Rounds of weighting and fitting one picture.
-const ROUNDS: usize = 12;
+const REWEIGHTINGS: usize = 12;
 /// A median of lengths of two normal numbers is so many of their sigmas.
 const MEDIAN_LENGTH: f64 = 1.177;
 
@@ -62,7 +62,7 @@ impl View {
         }
         let mut pose = planar::pose(&self.seen, &self.lens)?;
         let mut sigma = f64::INFINITY;
-        for _ in 0..ROUNDS {
+        for _ in 0..REWEIGHTINGS {
             // Six numbers of the pose have been fitted.
             let free = 1.0 - 3.0 / self.seen.len() as f64;
             sigma = median(self.residuals(&pose))? / MEDIAN_LENGTH / free.sqrt();

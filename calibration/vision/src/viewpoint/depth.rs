@@ -15,8 +15,8 @@ use rand_pcg::Pcg64;
 const STEP: f64 = 1.5e-3;
 const NOISE: f64 = 8e-3;
 /// A plane is large when so much of it is seen [m²], in so many of the pixels: a robot's flat faces are smaller.
-const LARGE: f64 = 0.08;
-const SEEN: f64 = 0.01;
+const LARGE_PLANE: f64 = 0.08;
+const MIN_PLANE_SHARE: f64 = 0.01;
 /// At most so many planes are taken out.
 const PLANES: usize = 8;
 /// Planes that are tried for each, and pixels that are asked about each.
@@ -34,7 +34,7 @@ pub fn silhouette(depth: &Grid, lens: &Lens) -> Grid {
     let sights: Vec<Vector3<f64>> = (0..depth.values.len()).map(|i| sight(i, depth.width, lens)).collect();
     let depths: Vec<f64> = depth.values.iter().map(|d| f64::from(*d) * 1e-3).collect();
     let mut standing: Vec<usize> = (0..depths.len()).filter(|i| depths[*i] > 0.0).collect();
-    let few = SEEN * depths.len() as f64;
+    let few = MIN_PLANE_SHARE * depths.len() as f64;
     let mut rng = Pcg64::seed_from_u64(1);
     for _ in 0..PLANES {
         let lies_in = |plane: &Plane, i: usize| {
@@ -48,7 +48,7 @@ pub fn silhouette(depth: &Grid, lens: &Lens) -> Grid {
         let (inside, outside): (Vec<usize>, Vec<usize>) = standing.iter().partition(|i| lies_in(&plane, **i));
         // A pixel covers the more of a plane the more the line of sight grazes it.
         let seen: f64 = inside.iter().map(|i| plane.norm() * depths[*i].powi(3)).sum();
-        if (inside.len() as f64) < few || seen / (lens.focal[0] * lens.focal[1]) < LARGE {
+        if (inside.len() as f64) < few || seen / (lens.focal[0] * lens.focal[1]) < LARGE_PLANE {
             break;
         }
         standing = outside;

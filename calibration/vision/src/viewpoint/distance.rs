@@ -4,11 +4,11 @@
 use super::grid::Grid;
 
 /// Stands for "nowhere": larger than any squared distance in a picture, small enough to keep its digits.
-const FAR: f32 = 1e9;
+const NOWHERE: f32 = 1e9;
 
 /// Distance of every pixel centre to the nearest one that is `marked` [pixel]; `f32::INFINITY` where none is.
 pub(super) fn distance(width: usize, height: usize, mut marked: impl FnMut(usize) -> bool) -> Grid {
-    let mut squared: Vec<f32> = (0..width * height).map(|i| if marked(i) { 0.0 } else { FAR }).collect();
+    let mut squared: Vec<f32> = (0..width * height).map(|i| if marked(i) { 0.0 } else { NOWHERE }).collect();
     let mut line = Envelope::new(width.max(height));
     let mut column = vec![0.0; height];
     for x in 0..width {
@@ -23,7 +23,7 @@ pub(super) fn distance(width: usize, height: usize, mut marked: impl FnMut(usize
     for row in squared.chunks_exact_mut(width) {
         line.transform(row);
     }
-    let root = |d: f32| if d >= FAR / 2.0 { f32::INFINITY } else { d.sqrt() };
+    let root = |d: f32| if d >= NOWHERE / 2.0 { f32::INFINITY } else { d.sqrt() };
     Grid { width, height, values: squared.into_iter().map(root).collect() }
 }
 

@@ -59,15 +59,15 @@ pub enum NoFit {
 const CANDIDATES: usize = 24;
 const FULLY: usize = 4;
 const SHAKES: usize = 8;
-const ROUNDS: usize = 2;
+const SHAKE_ROUNDS: usize = 2;
 /// Pictures that the first look uses.
 const LOOKED_AT: usize = 3;
 /// How far the best pose is shaken [rad, and share of the distance to the robot].
 const SHAKEN: f64 = 0.02;
 /// Less of the outline confirmed is no answer.
-const LEAST: f64 = 0.3;
+const MIN_CONFIRMED: f64 = 0.3;
 /// Poses nearer than this are one [rad, share of the distance].
-const SAME: f64 = 0.01;
+const SAME_POSE: f64 = 0.01;
 
 /// The pose near `start` that explains the frames best.
 ///
@@ -151,14 +151,14 @@ fn by_outline(
         found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     }
     let best = found.first().ok_or(NoFit::OutOfView)?;
-    if 1.0 - best.cost < LEAST {
+    if 1.0 - best.cost < MIN_CONFIRMED {
         return Err(NoFit::NotFound);
     }
     let other = found.iter().find(|other| {
         let (distance, angle) = super::step::apart(&other.camera_from_base, &best.camera_from_base);
-        distance > SAME * best.pivot.coords.norm() || angle > SAME
+        distance > SAME_POSE * best.pivot.coords.norm() || angle > SAME_POSE
     });
-    bar.stage(LAST, 1);
+    bar.stage(LAST_STAGE, 1);
     let last = refine(frames, shape, &best.camera_from_base, refine::LAST).unwrap_or_else(|| best.clone());
     let pose = last.camera_from_base;
     Ok(Fit {
@@ -176,13 +176,13 @@ pub(super) const BEGIN: Planned = ("begin", 0.0);
 const SCAN: &str = "scan";
 const COARSE: &str = "coarse";
 const FINE: &str = "fine";
-const LAST: &str = "last";
+const LAST_STAGE: &str = "last";
 const SWARM: &str = "swarm";
 
 /// How often the best pose is shaken: a silhouette has one border, a photo many edges, and there the best pose needs more
 /// company.
 fn rounds(frames: &[Frame]) -> usize {
-    if frames.iter().all(Frame::has_mask) { 0 } else { ROUNDS }
+    if frames.iter().all(Frame::has_mask) { 0 } else { SHAKE_ROUNDS }
 }
 
 /// Stages of the search, with how long they took of one photo [s].
@@ -190,7 +190,7 @@ pub(super) fn plan(frames: &[Frame], method: Method) -> Vec<Planned> {
     match method {
         Method::Outline => {
             let fine = std::iter::repeat_n((FINE, 1.6), 1 + rounds(frames));
-            [(SCAN, 4.6), (COARSE, 2.6)].into_iter().chain(fine).chain([(LAST, 0.2)]).collect()
+            [(SCAN, 4.6), (COARSE, 2.6)].into_iter().chain(fine).chain([(LAST_STAGE, 0.2)]).collect()
         }
         Method::Swarm(_) => vec![(SWARM, 10.0)],
     }

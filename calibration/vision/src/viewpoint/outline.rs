@@ -36,7 +36,7 @@ pub struct Outliner {
 }
 
 /// Nearer than this no part is looked for [m].
-const NEAR: f64 = 0.06;
+const NEAREST_PART: f64 = 0.06;
 /// How far beside the edge the z-buffer is asked what is there [pixel].
 const BESIDE: f64 = 1.5;
 const FURTHER: f64 = 4.5;
@@ -98,7 +98,7 @@ impl Outliner {
 
     /// The visible places of one edge; `third` is the far corner of the triangle that faces the camera.
     fn follow(&self, [a, b, third]: [Point3<f64>; 3], link: usize, out: &mut Vec<Place>) {
-        if a.z < NEAR || b.z < NEAR || third.z < NEAR {
+        if a.z < NEAREST_PART || b.z < NEAREST_PART || third.z < NEAREST_PART {
             return;
         }
         let [pa, pb, pc] = [a, b, third].map(|p| self.lens.project(&p));

@@ -10,7 +10,7 @@ const FOUND: [u8; 3] = [255, 32, 32];
 const STARTED: [u8; 3] = [40, 190, 60];
 /// Widest picture, and most of them one below the other.
 const WIDEST: usize = 960;
-const MOST: usize = 6;
+const MAX_PICTURES: usize = 6;
 
 /// Columns, rows and pixels (red, green, blue) of a sheet with the first pictures below each other.
 pub fn sheet(
@@ -20,7 +20,7 @@ pub fn sheet(
     found: &Isometry3<f64>,
     start: Option<&Isometry3<f64>>,
 ) -> (u32, u32, Vec<u8>) {
-    let pictures: Vec<(usize, usize, Vec<u8>)> = (frames.iter().zip(pixels).take(MOST))
+    let pictures: Vec<(usize, usize, Vec<u8>)> = (frames.iter().zip(pixels).take(MAX_PICTURES))
         .map(|(frame, pixels)| {
             let mut picture = shrunk(pixels);
             if let Some(start) = start {

@@ -14,7 +14,7 @@ pub struct Seen {
     pub pixel: [f64; 2],
 }
 
-const STEPS: usize = 30;
+const MAX_STEPS: usize = 30;
 
 /// The plane's frame, whose points have `z = 0`, in the camera's; `None` for fewer than four points, or points on a line.
 pub fn pose(seen: &[Seen], lens: &Lens) -> Option<Isometry3<f64>> {
@@ -99,7 +99,7 @@ fn refined(seen: &[Seen], lens: &Lens, start: &Isometry3<f64>) -> Option<(f64, I
     let mut pose = *start;
     let (mut cost, mut here) = at(&pose)?;
     let mut damping = 1e-3;
-    for _ in 0..STEPS {
+    for _ in 0..MAX_STEPS {
         let next = moved(&pose, &(pose * middle), &here.step(damping, 0.0)?);
         match at(&next) {
             Some((less, there)) if less <= cost => (pose, cost, here, damping) = (next, less, there, damping * 0.1),

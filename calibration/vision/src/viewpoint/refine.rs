@@ -78,7 +78,7 @@ pub const LAST: Range<usize> = 5..6;
 /// Steps with growing damping before a stage ends.
 const TRIALS: usize = 5;
 /// A stage ends when a step moves the picture by less than this [pixel].
-const STILL: f64 = 2e-3;
+const SMALLEST_MOTION: f64 = 2e-3;
 /// Outline between links counts less than that before the background: little tells two white links apart.
 const INNER: f64 = 0.3;
 
@@ -118,7 +118,7 @@ pub fn refine(frames: &[Frame], shape: &Shape, start: &Isometry3<f64>, which: Ra
             let weight: f64 = here.groups.iter().map(|group| group.weight).sum();
             let motion = ((equations.information * step).dot(&step) / weight.max(1e-9)).sqrt();
             here = there;
-            if motion < STILL {
+            if motion < SMALLEST_MOTION {
                 break;
             }
         }
@@ -181,7 +181,7 @@ struct Work<'a> {
 }
 
 /// Fewer pixels of outline in all pictures together say nothing.
-const FEWEST: f64 = 30.0;
+const MIN_OUTLINE: f64 = 30.0;
 
 impl<'a> Work<'a> {
     fn new(frames: &'a [Frame], shape: &'a Shape, stage: &'a Stage) -> Self {
@@ -202,7 +202,7 @@ impl<'a> Work<'a> {
                 length += place.length;
             }
         }
-        if length < FEWEST {
+        if length < MIN_OUTLINE {
             return None;
         }
         let pivot = Point3::from(sum / length);

@@ -22,7 +22,7 @@ pub struct Shot {
 }
 
 /// Joints slower than this stand still [rad/s].
-const STILL: f64 = 0.03;
+const REST_SPEED: f64 = 0.03;
 
 struct Known {
     clip: usize,
@@ -177,7 +177,7 @@ fn apart(one: &CalibratedCamera, other: &CalibratedCamera, [width, height]: [f64
 /// Those at rest, where there are any; of these one after the other the one that differs most from all chosen before.
 fn choose(mut known: Vec<Known>, wanted: usize) -> Vec<Known> {
     let slowest = known.iter().map(|known| known.speed).fold(f64::INFINITY, f64::min);
-    known.retain(|known| known.speed <= STILL.max(2.0 * slowest));
+    known.retain(|known| known.speed <= REST_SPEED.max(2.0 * slowest));
     let mut out: Vec<Known> = Vec::new();
     while out.len() < wanted.max(1) && !known.is_empty() {
         let apart = |known: &Known| {

@@ -7,7 +7,7 @@ use twin::arm::Joints;
 use twin::render::{Mesh, RobotSurface};
 
 /// Corners nearer than this are one [m].
-const SAME: f32 = 2e-6;
+const SAME_CORNER: f32 = 2e-6;
 /// Grid of the coarse copy [m]: at 1.3 m and 150 pixels of focal length a pixel and a half.
 const COARSE: f32 = 0.012;
 
@@ -51,7 +51,7 @@ impl Shape {
         let parts = |grid: f32| -> Vec<Part> {
             surface.parts().iter().zip(&links).map(|(mesh, link)| Part::new(mesh, grid, *link)).collect()
         };
-        let (fine, coarse) = (parts(SAME), parts(COARSE));
+        let (fine, coarse) = (parts(SAME_CORNER), parts(COARSE));
         Self { surface, fine, coarse }
     }
 

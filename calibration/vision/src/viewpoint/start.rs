@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use shared_mem::progress::{Planned, Progress};
 
 /// Places looked from: around, and from the table's height to far above [rad], away from the robot [m].
-const AROUND: usize = 16;
+const BEARINGS: usize = 16;
 const HEIGHTS: [f64; 4] = [0.1, 0.4, 0.7, 1.1];
 const DISTANCES: [f64; 4] = [0.9, 1.3, 1.8, 2.5];
 /// What is looked at: the middle of an arm [m].
@@ -19,7 +19,7 @@ const MIDDLE: f64 = 0.4;
 const TURN: f64 = 0.35;
 const FOLLOWED: usize = 5;
 /// The stage in which they are looked from, beside those of a fit as one photo took them.
-const LOOK: Planned = ("places", 46.0);
+const PLACES_STAGE: Planned = ("places", 46.0);
 
 /// The pose that explains the frames best, from anywhere around the robot.
 ///
@@ -29,20 +29,20 @@ pub fn search(frames: &[Frame], shape: &Shape, lens: &Lens, method: Method, seed
     let reach = Reach { angle: TURN, distance: 0.0 };
     let mut seen = Vec::new();
     let mut drawings = 0;
-    let places = AROUND * HEIGHTS.len() * DISTANCES.len();
+    let places = BEARINGS * HEIGHTS.len() * DISTANCES.len();
     let followed = std::iter::repeat_n(plan(frames, method), FOLLOWED).flatten();
-    let stages: Vec<_> = [BEGIN, LOOK].into_iter().chain(followed).collect();
+    let stages: Vec<_> = [BEGIN, PLACES_STAGE].into_iter().chain(followed).collect();
     let bar = Progress::planned("viewpoint", &stages, 1);
-    bar.stage(LOOK.0, places as u64);
+    bar.stage(PLACES_STAGE.0, places as u64);
     for place in 0..places {
-        let around = std::f64::consts::TAU * (place % AROUND) as f64 / AROUND as f64;
-        let height = HEIGHTS[place / AROUND % HEIGHTS.len()];
+        let around = std::f64::consts::TAU * (place % BEARINGS) as f64 / BEARINGS as f64;
+        let height = HEIGHTS[place / BEARINGS % HEIGHTS.len()];
         // A long lens stands further away: what is far follows from the field of view.
         let away =
-            DISTANCES[place / AROUND / HEIGHTS.len()] * (lens.focal[1] / (2.0 * lens.centre[1].max(1.0))).max(0.5);
+            DISTANCES[place / BEARINGS / HEIGHTS.len()] * (lens.focal[1] / (2.0 * lens.centre[1].max(1.0))).max(0.5);
         let from = Vector3::new(around.cos() * height.cos(), around.sin() * height.cos(), height.sin()) * away;
         let (candidates, drawn) = scan(&frames[..1], shape, &looking(&from), &reach, 1, || ());
-        bar.show(place as u64 + 1, LOOK.0);
+        bar.show(place as u64 + 1, PLACES_STAGE.0);
         drawings += drawn;
         seen.extend(candidates);
     }

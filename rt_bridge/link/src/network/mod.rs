@@ -33,7 +33,7 @@ use std::time::{Duration, Instant};
 use zenoh::Session;
 
 /// How often main looks.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_PERIOD: Duration = Duration::from_millis(50);
 /// Between two attempts to reach the other host for the first time.
 const RETRY: Duration = Duration::from_millis(250);
 /// Between two status lines, and between two remarks that nobody is reached.
@@ -99,7 +99,7 @@ fn reach(settings: &Settings, stop: &AtomicBool, is_over: &impl Fn() -> bool) ->
         }
         let until = Instant::now() + RETRY;
         while Instant::now() < until && !is_over() {
-            thread::sleep(LOOK);
+            thread::sleep(POLL_PERIOD);
         }
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
@@ -223,7 +223,7 @@ impl Work {
         let events: Publisher<Event> = node.publisher(topics::EVENTS)?;
         let (begin, mut line) = (Instant::now(), Instant::now());
         while !is_over() && !self.threads.iter().any(Thread::is_finished) {
-            thread::sleep(LOOK);
+            thread::sleep(POLL_PERIOD);
             for event in said.try_iter() {
                 events.send(&event)?;
             }

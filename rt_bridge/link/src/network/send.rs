@@ -20,7 +20,7 @@ use zenoh::sample::Sample;
 use zenoh::{Session, Wait};
 
 /// Longest sleep between two looks.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_PERIOD: Duration = Duration::from_millis(20);
 /// Messages that are sent again at a stretch, before new ones are taken out of shared memory.
 const STRETCH: usize = 64;
 /// Nothing was asked for.
@@ -87,7 +87,7 @@ fn send_all<M: Encoded>(shared: &Shared, topic: Topic<M>, count: &SentCount) -> 
     let (mut newest, mut is_behind) = (0, false);
     while !shared.is_over() {
         if !is_behind {
-            wake.wait(LOOK)?;
+            wake.wait(POLL_PERIOD)?;
         }
         while let Some(message) = source.receive()? {
             let taken_ns = now_ns();
@@ -133,7 +133,7 @@ fn send_newest<M: Encoded>(shared: &Shared, topic: Topic<M>, count: &SentCount) 
     let line = Line::open(shared, topic.name, M::schema(), Priority::InteractiveHigh)?;
     let mut number = 0;
     while !shared.is_over() {
-        wake.wait(LOOK)?;
+        wake.wait(POLL_PERIOD)?;
         let mut newest = None;
         while let Some(message) = source.receive()? {
             let mut count = lock(count);
@@ -160,7 +160,7 @@ pub(super) fn send_pictures(shared: &Shared, topic: ImageTopic, count: &SentCoun
     let line = Line::open(shared, topic.name, picture_schema(), Priority::DataLow)?;
     let (mut number, mut last) = (0, None);
     while !shared.is_over() {
-        wake.wait(LOOK)?;
+        wake.wait(POLL_PERIOD)?;
         let mut newest = None;
         while let Some(picture) = source.receive()? {
             newest = Some(picture);

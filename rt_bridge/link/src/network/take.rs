@@ -21,7 +21,7 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::sample::Sample;
 
 /// Longest wait between two looks at the end, and at readers that have joined.
-const LOOK: Duration = Duration::from_millis(200);
+const POLL_PERIOD: Duration = Duration::from_millis(200);
 /// Messages that wait for the thread.
 const WAITING: usize = 16_384;
 /// Pictures and commands that wait for the thread.
@@ -75,7 +75,7 @@ impl Line {
     /// The next message that is to be published; `None` when there is none yet.
     fn next(&mut self, shared: &Shared, count: &TakenCount) -> Result<Option<(Envelope, ZBytes)>, LinkError> {
         self.ask_after_a_return(shared)?;
-        let Some(arrived) = self.queue.pop(LOOK) else { return Ok(None) };
+        let Some(arrived) = self.queue.pop(POLL_PERIOD) else { return Ok(None) };
         if let Some(sleep) = self.pace.take(now_ns()) {
             std::thread::sleep(sleep);
         }

@@ -1,6 +1,6 @@
 //! `rt_bridge target fingers`.
 
-use super::{LONGEST, PATIENCE, PERIOD, REST, STILL};
+use super::{LONGEST, PATIENCE, PERIOD, REST, REST_SPEED};
 use anyhow::{Result, bail, ensure};
 use shared_mem::answer;
 use shared_mem::cell::Cell;
@@ -37,7 +37,7 @@ pub(super) fn go(node: &Node, (width, cell): (f64, Option<&Path>), json: bool, s
             continue;
         };
         heard = Instant::now();
-        still = if (state.width - stands).abs() < STILL { still + 1 } else { 0 };
+        still = if (state.width - stands).abs() < REST_SPEED { still + 1 } else { 0 };
         stands = state.width;
         if still >= 2 * REST {
             if json {

@@ -13,7 +13,7 @@ use std::path::Path;
 use twin::arm::ArmModel;
 
 /// How far the flange may be from the pose that was asked for [m].
-const OFF: f64 = 1e-3;
+const MAX_MISS: f64 = 1e-3;
 /// How far its axes may be turned from those that were asked for [rad].
 const TURNED: f64 = 5e-3;
 
@@ -108,7 +108,7 @@ impl Place {
     fn flange(self, pose: Isometry3<f64>, speed: f64) -> Result<Goal> {
         let nearest = self.model.nearest(&self.guard.limits, &self.first.q_d, &pose);
         ensure!(
-            nearest.off <= OFF && nearest.turned <= TURNED,
+            nearest.off <= MAX_MISS && nearest.turned <= TURNED,
             "nothing moved: that pose is out of reach from where the arm holds: the flange would be {:.1} mm and {:.1} degrees \
              from it; ask for another, or go by way of one between",
             1e3 * nearest.off,

@@ -9,7 +9,7 @@ use anyhow::{Result, bail};
 use shared_mem::msg::Joints;
 
 /// Positions that differ by less are the same [rad].
-const SAME: f64 = 1e-6;
+const SAME_POSITION: f64 = 1e-6;
 
 /// Whether an arm that holds at `from` gets to `goal` at this share of its highest speeds, all the way inside what `guard` keeps,
 /// within [`LONGEST`].
@@ -27,7 +27,9 @@ pub(super) fn check(guard: Guard, from: &Joints, goal: &Joints, speed: f64) -> R
         let (point, remark) = player.advance();
         refused(remark)?;
         let (q, dq) = (point.q_d.iter().zip(goal).take(dof), point.dq_d.iter().take(dof));
-        if q.into_iter().all(|(q, goal)| (q - goal).abs() < SAME) && dq.into_iter().all(|dq| dq.abs() < SAME) {
+        if q.into_iter().all(|(q, goal)| (q - goal).abs() < SAME_POSITION)
+            && dq.into_iter().all(|dq| dq.abs() < SAME_POSITION)
+        {
             return Ok(());
         }
     }

@@ -10,7 +10,7 @@ const WRITE: u8 = 0x10;
 /// Added to the function in a refusal.
 const REFUSAL: u8 = 0x80;
 /// Most registers that one request may carry.
-pub const MOST: usize = 123;
+pub const MAX_REGISTERS: usize = 123;
 
 /// A question to a station.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,13 +18,13 @@ pub enum Request {
     /// Registers from `address` on.
     Read {
         address: u16,
-        /// How many, 1 to [`MOST`].
+        /// How many, 1 to [`MAX_REGISTERS`].
         count: u16,
     },
     /// These values into the registers from `address` on.
     Write {
         address: u16,
-        /// Their values, 1 to [`MOST`] of them.
+        /// Their values, 1 to [`MAX_REGISTERS`] of them.
         values: Vec<u16>,
     },
 }
@@ -77,10 +77,10 @@ impl Request {
                 sealed([&[station, READ], &address.to_be_bytes()[..], &count.to_be_bytes()].concat())
             }
             Self::Write { address, values } => {
-                let count = values.len().min(MOST) as u16;
+                let count = values.len().min(MAX_REGISTERS) as u16;
                 let mut frame = [&[station, WRITE], &address.to_be_bytes()[..], &count.to_be_bytes()].concat();
                 frame.push(2 * count as u8);
-                frame.extend(values.iter().take(MOST).flat_map(|value| value.to_be_bytes()));
+                frame.extend(values.iter().take(MAX_REGISTERS).flat_map(|value| value.to_be_bytes()));
                 sealed(frame)
             }
         }
@@ -118,7 +118,7 @@ impl Request {
                 Ok(Some(Reply::Registers(values.collect())))
             }
             Self::Write { address, values } => {
-                let count = values.len().min(MOST) as u16;
+                let count = values.len().min(MAX_REGISTERS) as u16;
                 let fits = says == [address.to_be_bytes(), count.to_be_bytes()].concat();
                 if fits { Ok(Some(Reply::Written)) } else { Err(Garbage::Size) }
             }
@@ -154,8 +154,8 @@ mod tests {
 
     fn request() -> impl Strategy<Value = Request> {
         prop_oneof![
-            (any::<u16>(), 1..=MOST as u16).prop_map(|(address, count)| Request::Read { address, count }),
-            (any::<u16>(), proptest::collection::vec(any::<u16>(), 1..=MOST))
+            (any::<u16>(), 1..=MAX_REGISTERS as u16).prop_map(|(address, count)| Request::Read { address, count }),
+            (any::<u16>(), proptest::collection::vec(any::<u16>(), 1..=MAX_REGISTERS))
                 .prop_map(|(address, values)| Request::Write { address, values }),
         ]
     }

@@ -21,20 +21,20 @@ const REFINED: usize = 5000;
 /// Tolerances of the fits, of the object's size.
 const COARSE: f64 = 0.02;
 const MIDDLE: f64 = 0.0125;
-const STEPS: usize = 12;
+const FIT_STEPS: usize = 12;
 /// Noise with which candidates are compared, of the object's size.
 const NOISE: f64 = 0.003;
 /// Points further away than so many standard deviations are not on the surface.
 const WITHIN: f64 = 4.0;
 /// Least tolerance, of the object's size.
-const LEAST: f64 = 0.004;
+const MIN_TOLERANCE: f64 = 0.004;
 /// Costs of a point that is hidden or in the open, in the units of half a squared standard deviation's ratio.
 const HIDDEN: f64 = 3.0;
 const FREE: f64 = 7.0;
 /// Points of which neighbours share their error: so many of them count as one.
 const TOGETHER: f64 = 8.0;
 /// A pose that leaves the object where it was, of its size.
-const STILL: f64 = 0.03;
+const UNMOVED: f64 = 0.03;
 /// Cost of an axis away from the parts: this share for each size of the object.
 const LOOSE: f64 = 1.5;
 /// The frame is common to both states if that costs at most so much more [share].
@@ -79,7 +79,7 @@ pub(super) fn estimate(pair: &Pair<'_>, bar: &Progress) -> Result<Estimate, Arti
     candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let best = candidates.first().ok_or(ArticulatedError::Still { noise: MIDDLE * size })?;
     let in_place = |candidate: &&Candidate| {
-        let still = |pose: &Isometry3<f64>| apart(pair.first, pose, &Isometry3::identity()) < STILL * size;
+        let still = |pose: &Isometry3<f64>| apart(pair.first, pose, &Isometry3::identity()) < UNMOVED * size;
         candidate.motion.poses().iter().any(still)
     };
     let common = candidates.iter().find(in_place).filter(|c| c.cost < (1.0 + COMMON) * best.cost);
@@ -101,7 +101,7 @@ fn parts(pair: &Pair<'_>, points: &Points<'_>, whole: &Isometry3<f64>) -> Vec<Ca
         let joint = if turns { Joint::hinge(&rel, &near) } else { Joint::slide(&rel, &near) };
         let mut motion = Motion::Jointed(*whole, joint);
         for share in [COARSE, MIDDLE] {
-            motion = pair.fitted(motion, &sketch, share * size, STEPS);
+            motion = pair.fitted(motion, &sketch, share * size, FIT_STEPS);
         }
         let Motion::Jointed(_, joint) = motion else { return None };
         let apart = 1.0 + LOOSE * gap(pair, &motion, &joint, points);
@@ -174,12 +174,12 @@ fn noise(pair: &Pair<'_>, motion: &Motion, points: &Points<'_>, tolerance: f64) 
 /// The joint with all points, as both kinds.
 fn refined(pair: &Pair<'_>, motion: Motion, joint: Joint) -> Result<Estimate, ArticulatedError> {
     let (size, points) = (pair.size(), pair.points(REFINED));
-    let [whole, part] = pair.fitted(motion, &points, MIDDLE * size, STEPS).poses();
-    let least = LEAST * size;
+    let [whole, part] = pair.fitted(motion, &points, MIDDLE * size, FIT_STEPS).poses();
+    let least = MIN_TOLERANCE * size;
     let tolerance = (WITHIN * noise(pair, &motion, &points, MIDDLE * size)).clamp(least, MIDDLE * size);
     let rel = whole.inverse() * part;
     let near = middle_of(pair, &Open::beside(pair, &points, &whole, tolerance), &part);
-    let fit = |joint: Joint| pair.fitted(Motion::Jointed(whole, joint), &points, tolerance, 3 * STEPS);
+    let fit = |joint: Joint| pair.fitted(Motion::Jointed(whole, joint), &points, tolerance, 3 * FIT_STEPS);
     let slide = fit(Joint::slide(&rel, &near));
     let turn = match joint {
         Joint::Revolute { .. } => fit(joint),
@@ -216,7 +216,7 @@ impl Estimate {
 
     /// The same fitted again, once it is known which points move.
     pub(super) fn again(&self, pair: &Pair<'_>) -> Self {
-        let motion = pair.fitted(self.motion, &pair.points(REFINED), self.tolerance, 3 * STEPS);
+        let motion = pair.fitted(self.motion, &pair.points(REFINED), self.tolerance, 3 * FIT_STEPS);
         Self::of(pair, motion, (self.sigma, self.tolerance), self.evidence)
     }
 }
@@ -225,7 +225,7 @@ impl Estimate {
 fn in_place(pair: &Pair<'_>, motion: Motion) -> Motion {
     let Motion::Jointed(whole, joint) = motion else { return motion };
     let [one, other] = motion.poses().map(|pose| apart(pair.first, &pose, &Isometry3::identity()));
-    if other < STILL * pair.size() && one > other {
+    if other < UNMOVED * pair.size() && one > other {
         return Motion::Jointed(whole * joint.motion(), joint.reversed());
     }
     motion

@@ -16,7 +16,7 @@ const HIDDEN: f64 = 3.0;
 const NEARLY: f64 = 4.5;
 const FREE: f64 = 7.0;
 /// Largest weight of one place's evidence.
-const MOST: f64 = 4.0;
+const MAX_WEIGHT: f64 = 4.0;
 /// Places whose evidence has this weight at least, and is so far from a half once smoothed, are what others follow.
 const WEIGHTY: f64 = 1.0;
 const CLEAR: f64 = 0.3;
@@ -28,11 +28,11 @@ const AGREE: f64 = 0.5;
 /// Neighbours whose normals agree less (cosine) are on different sides of a wall.
 const SIDES: f64 = -0.3;
 /// Normals on a surface that goes on straight agree so far (cosine).
-const SAME: f64 = 0.9;
+const STRAIGHT_ON: f64 = 0.9;
 /// Rounds of the conjugate gradients, in smoothing and on, and the share of the squared residual at which they end.
-const ROUNDS: usize = 60;
-const WALKED: usize = 1500;
-const ENOUGH: f64 = 1e-7;
+const SMOOTHING_ITERATIONS: usize = 60;
+const CONTINUATION_ITERATIONS: usize = 1500;
+const CONVERGED: f64 = 1e-7;
 /// Times the border between the parts is smoothed.
 const SMOOTHED: usize = 4;
 
@@ -87,7 +87,7 @@ pub(super) fn seen_in(
     (tolerance, slide): (f64, Option<&Vector3<f64>>),
     (place, normal): (&Point3<f64>, &Vector3<f64>),
 ) -> Evidence {
-    let slides = slide.is_some_and(|slide| normal.dot(slide).powi(2) < 1.0 - SAME * SAME);
+    let slides = slide.is_some_and(|slide| normal.dot(slide).powi(2) < 1.0 - STRAIGHT_ON * STRAIGHT_ON);
     let cost = |which: usize| {
         let (place, normal) = (poses[which] * place, poses[which].rotation * normal);
         let is_of_other = || border.is_some_and(|border| is_beyond(border, &place) != (which == 1));
@@ -100,7 +100,7 @@ pub(super) fn seen_in(
         }
     };
     let [base, part] = [0, 1].map(cost);
-    Evidence { part: if part < base { 1.0 } else { 0.0 }, weight: (part - base).abs().min(MOST) }
+    Evidence { part: if part < base { 1.0 } else { 0.0 }, weight: (part - base).abs().min(MAX_WEIGHT) }
 }
 
 fn smoothed(grid: &Grid, values: &[f32]) -> Vec<f32> {
@@ -161,7 +161,7 @@ impl Rim {
         let diagonal: Vec<f64> =
             evidence.iter().zip(&self.beside).map(|(one, beside)| one.weight + beside.len() as f64).collect();
         let right: Vec<f64> = evidence.iter().map(|one| one.weight * one.part).collect();
-        solved(apply, &diagonal, &right, vec![0.5; evidence.len()], ROUNDS)
+        solved(apply, &diagonal, &right, vec![0.5; evidence.len()], SMOOTHING_ITERATIONS)
     }
 
     /// Whether each place moves: what is clear there, or where more of the random walks from it end (Grady 2006).
@@ -194,7 +194,7 @@ impl Rim {
             )
             .collect();
         let first = start.iter().zip(&clear).map(|(x, clear)| if *clear { 0.0 } else { *x }).collect();
-        let found = solved(open, &diagonal, &right, first, WALKED);
+        let found = solved(open, &diagonal, &right, first, CONTINUATION_ITERATIONS);
         (0..start.len()).map(|i| if clear[i] { start[i] > 0.5 } else { found[i] > 0.5 }).collect()
     }
 
@@ -223,7 +223,7 @@ impl Rim {
             number.map(|i| *i as usize)
         });
         let away = |i: usize| (self.places[i].0 - place).norm_squared();
-        let near = around.filter(|i| self.places[*i].1.dot(normal) > SAME && away(*i) < self.grid.voxel.powi(2));
+        let near = around.filter(|i| self.places[*i].1.dot(normal) > STRAIGHT_ON && away(*i) < self.grid.voxel.powi(2));
         near.min_by(|a, b| away(*a).total_cmp(&away(*b)))
     }
 
@@ -268,7 +268,7 @@ fn solved(
     let mut left: Vec<f64> = right.iter().zip(apply(&x)).map(|(b, a)| b - a).collect();
     let mut way = scaled(&left);
     let mut square = dot(&left, &way);
-    let end = ENOUGH * square;
+    let end = CONVERGED * square;
     for _ in 0..rounds {
         // Who asked for the end throws the result away.
         if square <= end || ending::asked() {

@@ -16,10 +16,10 @@ const SIDEWAYS: f64 = 0.2;
 /// A place is seen if nothing is before it by so many voxels.
 const BEFORE: f64 = 3.0;
 /// Steps of a ray, and the distance at which it has met the surface [voxel].
-const STEPS: usize = 200;
+const RAY_STEPS: usize = 200;
 const MET: f64 = 0.1;
 /// Least distance of the two marks [m].
-const APART: f64 = 5e-3;
+const MIN_MARK_DISTANCE: f64 = 5e-3;
 
 /// A picture in which the part is marked.
 #[derive(Debug, Clone)]
@@ -64,7 +64,7 @@ pub fn marked(
         })
     };
     let [from, to] = [lifted(axis[0])?, lifted(axis[1])?];
-    let direction = Unit::try_new(to - from, APART).ok_or_else(|| {
+    let direction = Unit::try_new(to - from, MIN_MARK_DISTANCE).ok_or_else(|| {
         ArticulatedError::Marks(format!("{}: the two pixels of the axis show one place; mark them apart", view.name))
     })?;
     let joint = if turns {
@@ -113,7 +113,7 @@ impl MarkedView {
 fn ray(body: &Body, eye: &Point3<f64>, way: &Unit<Vector3<f64>>) -> Option<Point3<f64>> {
     let field = &body.field;
     let mut along = entry(body, eye, way)?;
-    for _ in 0..STEPS {
+    for _ in 0..RAY_STEPS {
         let place = eye + way.into_inner() * along;
         let distance = field.distance_at(&place)?;
         if distance < MET * field.grid.voxel {

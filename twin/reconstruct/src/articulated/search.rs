@@ -24,9 +24,9 @@ const FITTED: usize = 160;
 const POINTS: usize = 350;
 /// Tolerances of a fit, of the object's size, and steps with each.
 const TOLERANCES: [f64; 3] = [0.05, 0.025, 0.0125];
-const STEPS: usize = 6;
+const STEPS_PER_TOLERANCE: usize = 6;
 /// Two poses that carry the object's points nearer to each other than this share of its size are one.
-const SAME: f64 = 0.03;
+const SAME_POSE: f64 = 0.03;
 
 /// What a point counts that lies on the other state's surface, inside of it, in the open.
 pub(super) fn value(place: &Place) -> f64 {
@@ -97,7 +97,7 @@ pub(super) fn poses(pair: &Pair<'_>, open: &Open, also: &[Isometry3<f64>], most:
         .map(|(_, pose)| {
             let mut motion = Motion::Pose(pose);
             for tolerance in TOLERANCES {
-                motion = pair.fitted(motion, &points, tolerance * size, STEPS);
+                motion = pair.fitted(motion, &points, tolerance * size, STEPS_PER_TOLERANCE);
             }
             let pose = motion.poses()[0];
             (open.gain(pair, &pose, TOLERANCES[2] * size, usize::MAX), pose)
@@ -106,7 +106,8 @@ pub(super) fn poses(pair: &Pair<'_>, open: &Open, also: &[Isometry3<f64>], most:
     fitted.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut distinct: Vec<(f64, Isometry3<f64>)> = Vec::new();
     for (gain, pose) in fitted {
-        if distinct.len() < most && distinct.iter().all(|(_, other)| apart(pair.first, &pose, other) > SAME * size) {
+        if distinct.len() < most && distinct.iter().all(|(_, other)| apart(pair.first, &pose, other) > SAME_POSE * size)
+        {
             distinct.push((gain, pose));
         }
     }

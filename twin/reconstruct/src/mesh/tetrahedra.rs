@@ -10,7 +10,7 @@ use std::collections::HashMap;
 const TETRAHEDRA: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 /// A corner of the surface stays so far from the nodes beside it [share of the edge]: no triangle is a point.
-const APART: f32 = 0.02;
+const FROM_NODES: f32 = 0.02;
 
 /// What was left out beside the object.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -66,7 +66,7 @@ fn marched(field: &Field<f32>) -> Mesh {
                         let (a, b) = (a.min(b), a.max(b));
                         let key = (grid.index(nodes[a]) as u32, (a ^ b) as u8);
                         *corners.entry(key).or_insert_with(|| {
-                            let share = (values[a] / (values[a] - values[b])).clamp(APART, 1.0 - APART);
+                            let share = (values[a] / (values[a] - values[b])).clamp(FROM_NODES, 1.0 - FROM_NODES);
                             let [low, high] = [nodes[a], nodes[b]].map(|node| grid.position(node));
                             mesh.points.push(low + (high - low) * f64::from(share));
                             mesh.points.len() as u32 - 1

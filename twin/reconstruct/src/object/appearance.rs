@@ -12,13 +12,13 @@ use splat::{Photograph, Settings, SplatCloud, TrainError};
 use std::path::PathBuf;
 
 /// Steps with a grid of 128 nodes along an edge; fewer with fewer.
-const STEPS: f64 = 2000.0;
+const STEPS_AT_128: f64 = 2000.0;
 /// Degree of the harmonics.
 const DEGREE: usize = 1;
 
 /// Steps for a grid of so many nodes along an edge.
 pub(super) fn steps(edge: u32) -> usize {
-    (STEPS * (f64::from(edge) / 128.0).sqrt().min(1.0)).ceil() as usize
+    (STEPS_AT_128 * (f64::from(edge) / 128.0).sqrt().min(1.0)).ceil() as usize
 }
 
 /// Trains the splats of a mesh. `state`: where an interrupted training is kept.

@@ -16,9 +16,9 @@ const COARSER: u32 = 3;
 /// A corner is shown by a view that it faces (cosine).
 const FACING: f64 = 0.25;
 /// Colours of fewer views say nothing about whether they agree.
-const FEWEST: usize = 3;
+const MIN_VIEWS: usize = 3;
 /// Colours further apart contradict each other [of 255].
-const APART: f64 = 16.0;
+const CONTRADICTORY: f64 = 16.0;
 
 /// What views show of each corner.
 #[derive(Debug)]
@@ -41,7 +41,10 @@ impl Evidence {
             }
         }
         let apart = Neighbours::of(mesh).smoothed(colours.iter().map(|colours| apart(colours)).collect());
-        Self { views, contradicted: apart.into_iter().map(|apart| apart.is_some_and(|apart| apart > APART)).collect() }
+        Self {
+            views,
+            contradicted: apart.into_iter().map(|apart| apart.is_some_and(|apart| apart > CONTRADICTORY)).collect(),
+        }
     }
 
     /// On which share of the mesh that it is of the views contradict each other [1].
@@ -116,7 +119,7 @@ pub(super) fn mean(frame: &Frame, [column, row]: [usize; 2], by: u32) -> Option<
 
 /// Mean distance of colours from their middle one, channel by channel.
 fn apart(colours: &[[f64; 3]]) -> Option<f64> {
-    if colours.len() < FEWEST {
+    if colours.len() < MIN_VIEWS {
         return None;
     }
     let mut sum = 0.0;

@@ -4,7 +4,7 @@ use crate::mesh::Mesh;
 use rayon::prelude::*;
 
 /// Rounds in which a corner takes the mean with its neighbours: pixels at the edge of a print differ anywhere.
-const ROUNDS: usize = 8;
+const SMOOTHINGS: usize = 8;
 
 /// The neighbours of each corner, one list behind the other.
 #[derive(Debug)]
@@ -44,7 +44,7 @@ impl Neighbours {
 
     /// Values that take the mean with their neighbours' again and again.
     pub(super) fn smoothed(&self, mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
-        (0..ROUNDS).for_each(|_| values = self.means(&values));
+        (0..SMOOTHINGS).for_each(|_| values = self.means(&values));
         values
     }
 }

@@ -19,7 +19,7 @@ pub(super) const STEP: f64 = 0.5;
 /// do not.
 const PIXEL: f64 = 0.4;
 /// Colours of fewer views say nothing.
-const FEWEST: usize = 3;
+const MIN_VIEWS: usize = 3;
 /// Colours of so many views are tried for a place's own.
 const REFERENCES: usize = 6;
 /// A variance rests on the colours of so many corners that share no pixel, of those that are averaged. More make the standard error
@@ -108,7 +108,7 @@ impl<'a> Stereo<'a> {
         }
         let windows: Vec<Window> = views.iter().filter_map(|v| self.views[usize::from(*v)].window(point)).collect();
         // A place that most of these views have outside of the object is not in it.
-        (windows.len() >= FEWEST && 2 * windows.len() >= views.len()).then(|| [left(&windows), whole(&windows)])
+        (windows.len() >= MIN_VIEWS && 2 * windows.len() >= views.len()).then(|| [left(&windows), whole(&windows)])
     }
 }
 

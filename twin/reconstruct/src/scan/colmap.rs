@@ -27,9 +27,9 @@ pub(crate) struct Model {
 }
 
 /// What a point becomes, with the room that a table keeps free [bytes].
-const POINT: usize = 2 * size_of::<(u64, Point3<f64>)>();
+const POINT_BYTES: usize = 2 * size_of::<(u64, Point3<f64>)>();
 /// What a place in a picture becomes [bytes].
-const SEEN: usize = size_of::<([f64; 2], u64)>();
+const SEEN_BYTES: usize = size_of::<([f64; 2], u64)>();
 /// Characters of a line that are shown.
 const SHOWN: usize = 80;
 
@@ -175,7 +175,7 @@ fn after(line: &str, words: usize) -> &str {
 fn text_points(file: &Text) -> Result<HashMap<u64, Point3<f64>>, ScanError> {
     let mut points = HashMap::new();
     for line in lines(&file.text).filter(|line| !line.trim().is_empty()) {
-        spend(&file.path, file.budget.take(POINT))?;
+        spend(&file.path, file.budget.take(POINT_BYTES))?;
         let words: Vec<&str> = line.split_whitespace().take(4).collect();
         let place: Option<Vec<f64>> = numbers(&words);
         let Some([number, x, y, z]) = place.as_deref() else {
@@ -310,7 +310,7 @@ fn binary_image(bytes: &mut Bytes<'_>, cameras: &HashMap<u32, Camera>) -> Read<I
     let (q, t, camera, name) = (bytes.f64s()?, bytes.f64s()?, bytes.u32()?, bytes.name()?);
     let mut seen = Vec::new();
     for _ in 0..bytes.u64()? {
-        bytes.draw(SEEN)?;
+        bytes.draw(SEEN_BYTES)?;
         let (place, point) = (bytes.f64s()?, bytes.u64()?);
         if point != u64::MAX {
             seen.push((place, point));
@@ -323,7 +323,7 @@ fn binary_image(bytes: &mut Bytes<'_>, cameras: &HashMap<u32, Camera>) -> Read<I
 fn binary_points(bytes: &mut Bytes<'_>) -> Read<HashMap<u64, Point3<f64>>> {
     let mut points = HashMap::new();
     for _ in 0..bytes.u64()? {
-        bytes.draw(POINT)?;
+        bytes.draw(POINT_BYTES)?;
         let (number, place): (u64, [f64; 3]) = (bytes.u64()?, bytes.f64s()?);
         let (_colour, _error) = (bytes.take::<3>()?, bytes.f64s::<1>()?);
         let track = bytes.u64()?;

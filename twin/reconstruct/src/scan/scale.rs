@@ -30,7 +30,7 @@ pub struct Scale {
 }
 
 /// Fewer points of a model with depth say nothing.
-const FEWEST: usize = 30;
+const MIN_POINTS: usize = 30;
 
 impl Scan {
     /// The scan's scale.
@@ -78,7 +78,7 @@ impl Scan {
                 }
             }
         }
-        if ratios.len() < FEWEST {
+        if ratios.len() < MIN_POINTS {
             return Err(ScanError::Missing(format!(
                 "{}: depth was measured at {} points of the COLMAP model, too few for its scale: give --scale METRES for one unit",
                 self.folder.display(),

@@ -36,7 +36,7 @@ const DEGREE: usize = 1;
 /// Depths beyond are left out: a stereo camera's are off by centimetres there [m].
 const FARTHEST: f32 = 4.0;
 /// Voxels that fewer views saw are no surface.
-const SEEN: u16 = 3;
+const MIN_VIEWS: u16 = 3;
 /// Parts of a surface with fewer triangles are noise.
 const ISLAND: usize = 200;
 
@@ -61,7 +61,9 @@ pub enum SceneError {
         metres: f64,
     },
     /// Depth was measured nowhere twice.
-    #[error("no surface is seen by {SEEN} views nearer than {FARTHEST} m: take pictures that overlap, from nearer")]
+    #[error(
+        "no surface is seen by {MIN_VIEWS} views nearer than {FARTHEST} m: take pictures that overlap, from nearer"
+    )]
     Nothing,
     /// All views stand on one side.
     #[error(
@@ -176,7 +178,7 @@ fn fused(bar: &Progress, views: &Views, options: &Options) -> Result<Surface, Sc
     bar.stage(FUSE, 2 + views.train.len() as u64);
     let settings = Fineness {
         voxel: options.voxel as f32,
-        least: SEEN,
+        least: MIN_VIEWS,
         farthest: FARTHEST,
         spread: spread(&views.train).unwrap_or_default() as f32,
         ..Fineness::default()

@@ -15,7 +15,7 @@ const PIXELS: usize = 300;
 /// A depth agrees with one from elsewhere that differs by so little of it.
 const AGREES: f64 = 0.03;
 /// Poses and depth belong together where so many agree.
-const ENOUGH: f64 = 0.3;
+const MIN_AGREEING_SHARE: f64 = 0.3;
 
 /// What poses look like that do not agree with depth.
 const FLIPPED: &str = "the cameras look the other way: give poses whose cameras look along -z with y up (transforms.json), or along z with \
@@ -140,9 +140,9 @@ pub(super) fn agree(frames: &[Frame], is_scale_open: bool) -> Result<(), SceneEr
     let pairs = pairs(frames);
     let share = agreement(&pairs, 1.0, &|pose| *pose, AGREES);
     let flipped = |guess: &'static str, meant: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>| {
-        (agreement(&pairs, 1.0, meant, AGREES) > ENOUGH.max(1.5 * share)).then_some(guess)
+        (agreement(&pairs, 1.0, meant, AGREES) > MIN_AGREEING_SHARE.max(1.5 * share)).then_some(guess)
     };
-    let guess = if share < ENOUGH {
+    let guess = if share < MIN_AGREEING_SHARE {
         flipped(FLIPPED, &turned(Vector3::new(1.0, -1.0, -1.0), false))
             .or_else(|| flipped(MIRRORED, &turned(Vector3::new(-1.0, 1.0, 1.0), true)))
     } else {
@@ -151,7 +151,7 @@ pub(super) fn agree(frames: &[Frame], is_scale_open: bool) -> Result<(), SceneEr
     if guess.is_none() && is_scale_open {
         scale_agrees(&pairs)?;
     }
-    if share >= ENOUGH {
+    if share >= MIN_AGREEING_SHARE {
         return Ok(());
     }
     Err(ScanError::Missing(format!(
@@ -172,7 +172,7 @@ fn scale_agrees(pairs: &[Pair<'_>]) -> Result<(), SceneError> {
     };
     let (metres, share) = best((-120..=120).map(|step| 1.025f64.powi(step)).collect(), AGREES / 2.0);
     let now = agreement(pairs, 1.0, &|pose| *pose, AGREES / 2.0);
-    if (metres - 1.0).abs() < 0.04 || share < ENOUGH.max(1.3 * now) {
+    if (metres - 1.0).abs() < 0.04 || share < MIN_AGREEING_SHARE.max(1.3 * now) {
         return Ok(());
     }
     let (metres, _) = best((-30..=30).map(|step| metres * 1.001f64.powi(step)).collect(), AGREES / 4.0);

@@ -13,7 +13,7 @@ use super::Planes;
 use super::tiles::Drawn;
 use crate::project::FAINTEST;
 use crate::real::Real;
-use crate::reference::{MOST, SPENT, TILE};
+use crate::reference::{MAX_ALPHA, SPENT, TILE};
 
 /// Pixels that are taken together.
 const LANES: usize = 8;
@@ -90,7 +90,7 @@ fn alphas<T: Real, const C: usize>(splat: &Drawn<T, C>, x: &[T; LANES], y: T) ->
     for l in 0..LANES {
         free[l] = splat.opacity * ((a * x[l] + b) * x[l] + c).bell();
     }
-    let most = T::of(MOST);
+    let most = T::of(MAX_ALPHA);
     let mut held = free;
     for l in 0..LANES {
         held[l] = if free[l] < most { free[l] } else { most };
@@ -245,7 +245,7 @@ struct Gathered<T, const C: usize> {
 impl<T: Real, const C: usize> BackwardLanes<T, C> {
     #[inline(always)]
     fn take(&mut self, splat: &Drawn<T, C>, x: &[T; LANES], y: T, gathered: &mut Gathered<T, C>) {
-        let (faintest, spent, most) = (T::of(FAINTEST), T::of(SPENT), T::of(MOST));
+        let (faintest, spent, most) = (T::of(FAINTEST), T::of(SPENT), T::of(MAX_ALPHA));
         let (free, alpha) = alphas(splat, x, y);
         let mut weight = [T::zero(); LANES];
         for l in 0..LANES {

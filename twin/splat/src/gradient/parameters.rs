@@ -25,7 +25,7 @@ pub struct Parameters<T> {
 /// Kinds of numbers.
 const KINDS: usize = 5;
 /// The nearest that an opacity comes to 0 and 1.
-const LEAST: f32 = 1e-6;
+const OPACITY_MARGIN: f32 = 1e-6;
 
 impl<T: Real> Parameters<T> {
     /// All 0.
@@ -84,7 +84,7 @@ impl<T: Real> Parameters<T> {
         let mut out = Self::zeros(cloud.splats.len(), cloud.degree);
         for (i, splat) in cloud.splats.iter().enumerate() {
             let turn = splat.rotation.quaternion();
-            let opacity = splat.opacity.clamp(LEAST, 1.0 - LEAST);
+            let opacity = splat.opacity.clamp(OPACITY_MARGIN, 1.0 - OPACITY_MARGIN);
             out.centre[i] = [splat.centre.x, splat.centre.y, splat.centre.z].map(wide);
             out.turn[i] = [turn.w, turn.i, turn.j, turn.k].map(wide);
             out.log_sigma[i] = [0, 1, 2].map(|k| wide(splat.sigma[k].max(1e-30)).ln());

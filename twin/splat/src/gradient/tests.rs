@@ -70,7 +70,7 @@ fn target(seed: u64) -> Target<f64> {
 const STEP_CENTRE: f64 = 2e-8;
 const STEP: f64 = 1e-6;
 /// Of slopes that are a smaller share of the largest of their kind, rounding leaves too little.
-const LEAST: f64 = 0.03;
+const MIN_SLOPE_SHARE: f64 = 0.03;
 
 fn compare<const C: usize>(weights: &Weights, entries: usize, seed: u64) {
     let (splats, pose) = scene(150, seed);
@@ -86,7 +86,7 @@ fn compare<const C: usize>(weights: &Weights, entries: usize, seed: u64) {
         let column = slope.columns()[kind];
         let largest = column.iter().fold(0.0f64, |most, value| most.max(value.abs()));
         let at = rng.random_range(0..column.len());
-        if column[at].abs() < LEAST * largest {
+        if column[at].abs() < MIN_SLOPE_SHARE * largest {
             continue;
         }
         let value = |by: f64| {

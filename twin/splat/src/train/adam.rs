@@ -12,7 +12,7 @@ const SPARE: f32 = 1e-15;
 /// The first coefficient of a colour learns so much quicker than the others.
 const FIRST_COLOR: f64 = 20.0;
 /// Splats that one thread takes at least.
-const FEW: usize = 256;
+const SPLATS_PER_THREAD: usize = 256;
 
 /// Parameters on their way.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,7 +44,7 @@ impl Moments {
         for ((((at, mean), (square, slope)), width), rate) in columns.zip(widths).zip(rates) {
             (at.par_chunks_mut(width).zip(mean.par_chunks_mut(width)))
                 .zip(square.par_chunks_mut(width).zip(slope.par_chunks(width)))
-                .with_min_len(FEW)
+                .with_min_len(SPLATS_PER_THREAD)
                 .filter(|(_, (_, slope))| slope.iter().any(|slope| *slope != 0.0))
                 .for_each(|((at, mean), (square, slope))| {
                     for (k, slope) in slope.iter().enumerate() {

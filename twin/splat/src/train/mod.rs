@@ -73,7 +73,7 @@ pub struct Settings {
 impl Rates {
     /// After a share of the training, that of the centres in metres.
     fn after(&self, share: f64, extent: f64) -> Self {
-        let left = LAST.powf(share);
+        let left = LAST_RATE.powf(share);
         Self {
             centre: self.centre * extent * LAST_CENTRE.powf(share),
             turn: self.turn * left,
@@ -152,7 +152,7 @@ const ON_SURFACE: f64 = 2e-5;
 const KEEP: usize = 500;
 /// What is left at the end of the centres' rate, and of all others.
 const LAST_CENTRE: f64 = 0.01;
-const LAST: f64 = 0.1;
+const LAST_RATE: f64 = 0.1;
 
 /// Trains a cloud on photographs. `progress` hears of every step and may break it off.
 ///

@@ -10,10 +10,10 @@ const LONGEST_STEP: f64 = 2.5e-4;
 /// Where friction turns round over some mrad/s it changes by as much as it can within a few periods of 1 ms: while a joint is slower
 /// than so many times that, a period is taken in so many parts. One part leaves 55 sigma² of the torque asked for at a Stribeck
 /// velocity of 14 mrad/s, two leave 5. Beyond, `exp(-25)` of the change is left.
-const SLOW: f64 = 5.0;
+const SLOW_RATIO: f64 = 5.0;
 const SLOW_PARTS: f64 = 4.0;
 /// Where it turns round over hundreds of them, one part will do [rad/s].
-const FAST: f64 = 0.05;
+const SLOW_AT_MOST: f64 = 0.05;
 /// Bristles bend over a way; this is slow for some mrad [rad/s].
 const SLOW_TO_BEND: f64 = 0.05;
 /// A joint that is slower rests when it is first seen [rad/s]: encoders' noise, and a tenth of the slowest motions.
@@ -66,7 +66,7 @@ impl ArmEffects {
     /// Below this speed the dry friction of a joint changes within a few periods [rad/s]; 0 where it turns round at once.
     fn slow(&self, joint: usize) -> f64 {
         let bends = if self.joint_presliding_friction.is_some() { SLOW_TO_BEND } else { 0.0 };
-        (SLOW * self.creep(joint).max(self.falls_over(joint))).min(FAST).max(bends)
+        (SLOW_RATIO * self.creep(joint).max(self.falls_over(joint))).min(SLOW_AT_MOST).max(bends)
     }
 
     /// How far bristles are bent where nothing is known of what was before: as far as keeps a joint at rest, wholly in motion.

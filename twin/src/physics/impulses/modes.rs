@@ -15,7 +15,7 @@ const GIVE: f64 = 1e-6;
 /// body can have, as where both ends of a turning tool hold fast.
 const FORCED: f64 = 10.0;
 /// A slip slower than this has no direction [m/s].
-const STILL: f64 = 1e-6;
+const DIRECTIONLESS_SLIP: f64 = 1e-6;
 
 /// What a place does.
 #[derive(Clone, Copy)]
@@ -46,7 +46,7 @@ impl Mode {
         }
         let slip = relative - contact.normal * parting;
         let speed = slip.norm();
-        match (speed > STILL, contact.friction > 0.0) {
+        match (speed > DIRECTIONLESS_SLIP, contact.friction > 0.0) {
             (true, _) => Self::Slips(contact.normal - slip * (contact.friction / speed)),
             (false, true) => Self::Sticks,
             (false, false) => Self::Slips(contact.normal),
@@ -151,7 +151,7 @@ impl<const N: usize> Impulses<'_, N> {
                 Mode::Sticks if friction_impulse.norm() > friction * push => {
                     Mode::Slips(normal + friction_impulse * (friction / friction_impulse.norm()))
                 }
-                Mode::Slips(along) if after.dot(&(along - normal)) > STILL * friction => Mode::Sticks,
+                Mode::Slips(along) if after.dot(&(along - normal)) > DIRECTIONLESS_SLIP * friction => Mode::Sticks,
                 _ => continue,
             };
             (modes[i], corrected) = (instead, true);

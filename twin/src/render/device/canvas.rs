@@ -12,7 +12,7 @@ use wgpu::BufferUsages as Usages;
 const TILE: u32 = 8;
 const GROUP: u32 = 256;
 /// Bytes of a projected splat, of an entry of a tile's list, and of a pixel that comes back.
-const SEEN: u64 = 48;
+const SPLAT_BYTES: u64 = 48;
 const ENTRY: u64 = 8;
 const PIXEL: u64 = 24;
 
@@ -74,7 +74,7 @@ impl DeviceCanvas {
         let buffers = Buffers {
             view: device.buffer(VIEW, Usages::UNIFORM | Usages::COPY_DST)?,
             bodies: device.buffer(models.bodies.len() as u64 * BODY, Usages::STORAGE | Usages::COPY_DST)?,
-            seen: device.buffer(splats * SEEN, Usages::STORAGE)?,
+            seen: device.buffer(splats * SPLAT_BYTES, Usages::STORAGE)?,
             tiles: device
                 .buffer((2 * columns * rows + 1) * 4, Usages::STORAGE | Usages::COPY_DST | Usages::COPY_SRC)?,
             lookup: device.send(lookup, Usages::STORAGE)?,

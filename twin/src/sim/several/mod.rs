@@ -31,9 +31,9 @@ use shared_mem::time::TICK_NS;
 pub use state::SceneState;
 
 /// Objects nearer than this, and as much more as they may come nearer in a period, are many bodies [m].
-const NEAR: f64 = 1e-3;
+const JOIN_DISTANCE: f64 = 1e-3;
 /// They are so until all are farther apart than this [m], which is looked at once in so many periods.
-const APART: f64 = 5e-3;
+const PART_DISTANCE: f64 = 5e-3;
 const LOOK_EVERY: u32 = 20;
 
 /// The simulated cell with all objects.
@@ -264,7 +264,7 @@ impl SimScene {
         let fastest = self.objects().map(speed).fold(0.0, f64::max);
         let Some(mut many) = self.many.take() else { return false };
         many.take_up(self.objects());
-        let near = many.any_near(NEAR + 2.0 * fastest * shared_mem::time::TICK);
+        let near = many.any_near(JOIN_DISTANCE + 2.0 * fastest * shared_mem::time::TICK);
         self.many = Some(many);
         self.known_apart = still && !near;
         near
@@ -282,7 +282,7 @@ impl SimScene {
     /// Each by itself again, where all are apart.
     fn part(&mut self) {
         let Some(many) = self.many.take() else { return };
-        if !many.any_near(APART) {
+        if !many.any_near(PART_DISTANCE) {
             let first = self.cell.object.iter_mut();
             let all = first.chain(self.others.iter_mut().map(|other| &mut other.object));
             for (i, object) in all.enumerate() {
