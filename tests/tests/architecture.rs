@@ -228,6 +228,19 @@ fn what_identifies_and_diagnoses_names_no_effect() {
 }
 
 #[test]
+fn the_laws_of_motion_know_no_effect() {
+    let laws = ["arm/", "sliding/", "physics/", "world/", "contact_law.rs"].map(|law| format!("twin/src/{law}"));
+    for (file, lines) in product_lines() {
+        let known = lines.iter().find(|line| line.contains("crate::effects"));
+        let is_law = laws.iter().any(|law| file.starts_with(law));
+        assert!(
+            !is_law || known.is_none(),
+            "{file} knows effects; they fill in its numbers or implement its traits: {known:?}"
+        );
+    }
+}
+
+#[test]
 fn modules_beside_each_other_need_each_other_in_no_circle() {
     let lines = product_lines();
     let mut found = Vec::new();
