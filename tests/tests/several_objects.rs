@@ -28,7 +28,8 @@ fn two_objects() -> String {
     let model = ArmModel::from_cell(&cell).expect("an FR3");
     let [flange, tip] = [model.flange(model.ready()).isometry(), model.tip(model.ready()).isometry()];
     let way = nalgebra::Vector3::from(TIP) - tip.translation.vector;
-    let q = model.reach(model.ready(), &nalgebra::one(), &(Translation3::from(way) * flange), None).expect("within reach");
+    let q =
+        model.reach(model.ready(), &nalgebra::one(), &(Translation3::from(way) * flange), None).expect("within reach");
     let text = format!("{before}{}{}[camera]{after}", object("cup", CUP), object("milk_box", MILK));
     text.replace("[simulation]", &format!("[simulation]\nq = {:?}", &q[..7]))
 }

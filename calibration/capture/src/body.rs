@@ -5,7 +5,7 @@
 use nalgebra::{Isometry3, Point3};
 use shared_mem::cell::{Cell, Tool};
 use shared_mem::msg::{Joints, MAX_JOINTS};
-use twin::arm::{ArmHull, ArmModel, JointState, ModelError};
+use twin::arm::{ArmBalls, ArmModel, JointState, ModelError};
 
 /// Balls of a link are joined by balls no farther apart than their radius, or this where nobody knows how thick it is [m].
 const THIN: f64 = 0.01;
@@ -17,7 +17,7 @@ const CAMERA: f64 = 0.065;
 pub struct Body {
     model: ArmModel,
     tool: Option<Tool>,
-    hull: Option<ArmHull>,
+    hull: Option<ArmBalls>,
     camera: Option<Isometry3<f64>>,
 }
 
@@ -28,7 +28,7 @@ impl Body {
     /// [`ModelError`] when it describes no arm.
     pub fn of(cell: &Cell) -> Result<Self, ModelError> {
         let model = ArmModel::from_cell(cell)?;
-        Ok(Self { hull: ArmHull::of(cell, &model), model, tool: cell.tool.clone(), camera: None })
+        Ok(Self { hull: ArmBalls::of(cell, &model), model, tool: cell.tool.clone(), camera: None })
     }
 
     /// The same with a camera on its flange.

@@ -12,7 +12,7 @@
 use super::{Limits, Stopping, Trace};
 use shared_mem::cell::Cell;
 use shared_mem::msg::{Joints, MAX_JOINTS};
-use twin::arm::{ArmHull, ArmModel, MOST_BALLS};
+use twin::arm::{ArmBalls, ArmModel, MOST_BALLS};
 
 /// Gap that is kept between the table and tool or links [m].
 pub const TABLE_GAP: f64 = 2e-3;
@@ -34,7 +34,7 @@ const BOUNDS: usize = MOST_BALLS + 1;
 #[derive(Debug, Clone)]
 pub struct Workspace {
     /// `None` where positions in space mean nothing: then everything is inside.
-    arm: Option<ArmHull>,
+    arm: Option<ArmBalls>,
     /// Lowest corner of the box for the centre of the tip's cap [m].
     low: [f64; 3],
     high: [f64; 3],
@@ -66,7 +66,7 @@ impl Workspace {
     /// The space of a cell, whose arm is `model`: tool and links 2 mm above its table, the tip within 1.2 m of the base along
     /// each axis.
     pub fn of(cell: &Cell, model: &ArmModel) -> Self {
-        let arm = ArmHull::of(cell, model);
+        let arm = ArmBalls::of(cell, model);
         let levers = arm.as_ref().map_or([[0.0; MAX_JOINTS]; 2], |arm| [arm.levers(), arm.height_levers()]);
         Self {
             arm,

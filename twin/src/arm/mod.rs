@@ -15,7 +15,7 @@
 //! | `kinematics` | flange, Jacobian |
 //! | `inverse_kinematics` | joints that bring the flange to a pose, or within their limits as near to it as they can |
 //! | `follower` | [`Follower`]: the way to a target that may change at any time (the only `rsruckig` code of the product but the capture's plans) |
-//! | `hull` | [`ArmHull`]: the space that links and tool take |
+//! | `balls` | [`ArmBalls`]: the space that links and tool take |
 //! | `dynamics` | gravity, Coriolis, mass matrix, accelerations |
 //! | `control` | [`ControlLaw`]: from command to torque |
 //! | `gains` | where its gains may lie |
@@ -25,6 +25,7 @@
 //! | `transmission` | the same with friction, yielding and play between motor and link |
 //! | `kernel`, `spatial` | the arithmetic below |
 
+mod balls;
 mod chain;
 mod control;
 mod dry_friction;
@@ -33,7 +34,6 @@ mod error;
 mod follower;
 mod fr3;
 mod gains;
-mod hull;
 mod inertia;
 mod inverse_kinematics;
 mod kernel;
@@ -48,6 +48,7 @@ mod transmission;
 mod urdf;
 mod yielding;
 
+pub use balls::{ArmBalls, Extent, MOST_BALLS};
 pub use chain::HeldJoint;
 pub use control::{ControlLaw, GainError};
 pub use dry_friction::Presliding;
@@ -55,7 +56,6 @@ pub use dynamics::PointForce;
 pub use error::ModelError;
 pub use follower::Follower;
 pub use gains::{damping_range, stiffness_range};
-pub use hull::{ArmHull, Extent, MOST_BALLS};
 pub use inertia::MassProperties;
 pub use inverse_kinematics::{Nearest, pose_difference};
 pub use kinematics::Jacobian;

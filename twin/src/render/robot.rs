@@ -170,7 +170,7 @@ fn about_z(angle: f64) -> UnitQuaternion<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::ArmHull;
+    use crate::arm::ArmBalls;
     use crate::shipped::shipped;
 
     #[test]
@@ -195,7 +195,7 @@ mod tests {
         let mut cell = shipped();
         cell.tool = None;
         let surface = RobotSurface::new(&cell, Hand::None).expect("a robot");
-        let (hull, links) = (ArmHull::of(&cell, surface.model()).expect("an arm with geometry"), surface.links());
+        let (hull, links) = (ArmBalls::of(&cell, surface.model()).expect("an arm with geometry"), surface.links());
         let (mut furthest, mut pose) = (0.0_f64, *surface.model().ready());
         for k in 0..200_u32 {
             // Steps of the golden ratio's share of a turn, a different multiple for each joint: no pose comes twice.

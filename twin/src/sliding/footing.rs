@@ -1,8 +1,8 @@
 //! Between a free rigid body and one that stands: which face is down, and how the two states turn into each other.
 
-use super::hull::Hull;
 use super::patch::Patch;
 use super::planar::PlanarState;
+use super::polygon::Polygon;
 use super::slider::Slider;
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector2, Vector3};
 use shared_mem::cell::Support;
@@ -108,7 +108,7 @@ impl Footing {
         let turned = upright.to_rotation_matrix();
         let place = |p: &Point3<f64>| turned * (p.coords - solid.centre_of_mass);
         let lowest = solid.corners.iter().map(|p| place(p).z).fold(f64::INFINITY, f64::min);
-        let hull = Hull::of(solid.corners.iter().map(place).filter(|p| p.z < lowest + BASE).map(|p| p.xy()))?;
+        let hull = Polygon::of(solid.corners.iter().map(place).filter(|p| p.z < lowest + BASE).map(|p| p.xy()))?;
         if !hull.holds(Vector2::zeros(), 0.0) {
             return None;
         }

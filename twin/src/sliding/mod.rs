@@ -14,17 +14,17 @@
 
 mod footing;
 mod friction;
-mod hull;
 mod impulse;
 mod load;
 mod patch;
 mod planar;
+mod polygon;
 mod slider;
 
 pub use footing::{BASE, Closeness, Footing, FreeBody, Solid};
 pub use friction::{Coulomb, SlidingFriction};
-pub use hull::MAX_POINTS;
 pub use load::Wrench;
 pub use patch::{Patch, PatchError};
 pub use planar::PlanarState;
+pub use polygon::MAX_POINTS;
 pub use slider::{Ending, Slider};

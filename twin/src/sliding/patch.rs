@@ -5,7 +5,7 @@
 //! hull cut into sectors from its centroid and each sector into shells; a place stands at its cell's radius of gyration,
 //! so that the yaw of a spinning slide is within 0.5 % of a patch of 2000 places.
 
-use super::hull::{Hull, MAX_POINTS};
+use super::polygon::{MAX_POINTS, Polygon};
 use nalgebra::Vector2;
 use shared_mem::cell::Support;
 
@@ -49,7 +49,7 @@ macro_rules! with_places {
                 $body
             }
             _ => {
-                let $places = $patch.first::<{ $crate::sliding::hull::MAX_POINTS }>();
+                let $places = $patch.first::<{ $crate::sliding::polygon::MAX_POINTS }>();
                 $body
             }
         }
@@ -68,7 +68,7 @@ impl Patch {
     /// # Errors
     /// [`PatchError`] when the hull has no area or too many corners.
     pub fn under(base: impl Iterator<Item = Vector2<f64>> + Clone, support: Support) -> Result<Self, PatchError> {
-        let hull = Hull::of(base).ok_or(PatchError)?;
+        let hull = Polygon::of(base).ok_or(PatchError)?;
         Ok(Self::of_hull(&hull, support))
     }
 
@@ -82,7 +82,7 @@ impl Patch {
         Self::under(corners.into_iter(), support)
     }
 
-    pub(super) fn of_hull(hull: &Hull, support: Support) -> Self {
+    pub(super) fn of_hull(hull: &Polygon, support: Support) -> Self {
         let mut patch = Self { points: [Vector2::zeros(); MAX_POINTS], weights: [0.0; MAX_POINTS], count: 0 };
         match support {
             Support::Corners => hull.corners().iter().for_each(|corner| patch.push(*corner, 1.0)),
@@ -164,7 +164,7 @@ impl Patch {
 }
 
 /// Cuts the rim into `pieces` (or fewer) parts that never bend around a corner, and hands out the ends of each.
-fn along_rim(hull: &Hull, pieces: usize, mut each: impl FnMut(Vector2<f64>, Vector2<f64>)) {
+fn along_rim(hull: &Polygon, pieces: usize, mut each: impl FnMut(Vector2<f64>, Vector2<f64>)) {
     let (edges, perimeter) = (hull.corners().len(), hull.perimeter());
     let spare = pieces.saturating_sub(edges) as f64;
     for (a, b) in hull.edges() {

@@ -7,7 +7,7 @@ pub const MAX_POINTS: usize = 64;
 
 /// A convex polygon, counter-clockwise, of at most [`MAX_POINTS`] corners.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Hull {
+pub(super) struct Polygon {
     corners: [Vector2<f64>; MAX_POINTS],
     count: usize,
 }
@@ -15,7 +15,7 @@ pub(super) struct Hull {
 /// Corners nearer to each other than this are one [m]: meshes carry rounding noise.
 const SAME_CORNER: f64 = 1e-7;
 
-impl Hull {
+impl Polygon {
     /// The hull; `None` when the points span no area. Of a round base, which has more corners than fit, those that lie
     /// outermost in directions all around are kept.
     pub(super) fn of(points: impl Iterator<Item = Vector2<f64>> + Clone) -> Option<Self> {
@@ -94,7 +94,7 @@ mod tests {
     #[test]
     fn the_hull_keeps_the_corners_and_drops_what_lies_between() {
         let points = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 0.5), (0.0, 1.0), (0.0, 1.0), (0.0, 0.5)];
-        let hull = Hull::of(points.iter().map(|(x, y)| Vector2::new(*x, *y))).expect("an area");
+        let hull = Polygon::of(points.iter().map(|(x, y)| Vector2::new(*x, *y))).expect("an area");
         assert_eq!(hull.corners().len(), 4);
         assert!((hull.area() - 2.0).abs() < 1e-12 && (hull.perimeter() - 6.0).abs() < 1e-12);
         assert!((hull.centroid() - Vector2::new(1.0, 0.5)).norm() < 1e-12);
@@ -107,12 +107,12 @@ mod tests {
             let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 500.0).sin_cos();
             Vector2::new(cos, sin)
         });
-        let hull = Hull::of(circle).expect("an area");
+        let hull = Polygon::of(circle).expect("an area");
         assert!(hull.corners().len() < MAX_POINTS && (hull.area() / std::f64::consts::PI - 1.0).abs() < 0.01);
     }
 
     #[test]
     fn points_on_a_line_have_no_hull() {
-        assert!(Hull::of((0..5).map(|i| Vector2::new(f64::from(i), 2.0 * f64::from(i)))).is_none());
+        assert!(Polygon::of((0..5).map(|i| Vector2::new(f64::from(i), 2.0 * f64::from(i)))).is_none());
     }
 }

@@ -1,5 +1,5 @@
 //! How much space an arm and its tool take: balls that move with the links. The hull of a link's balls encloses the link, so
-//! the arm is above a plane where all its balls are. Base frame, m. [`ArmHull::at`] allocates nothing: the bridge's guard asks it
+//! the arm is above a plane where all its balls are. Base frame, m. [`ArmBalls::at`] allocates nothing: the bridge's guard asks it
 //! for many poses in each control cycle.
 
 use super::kernel::{Chain, first, with_dof};
@@ -42,7 +42,7 @@ struct Ball {
 
 /// The space of one arm.
 #[derive(Debug, Clone)]
-pub struct ArmHull {
+pub struct ArmBalls {
     model: ArmModel,
     balls: [Ball; MOST_BALLS],
     count: usize,
@@ -57,7 +57,7 @@ pub struct Extent {
     pub tip: [f64; 3],
 }
 
-impl ArmHull {
+impl ArmBalls {
     /// The hull of a cell's arm, whose model is `model`: the links of an arm built like an FR3, or the line from joint to joint of another arm, of
     /// which nobody says how thick it is; and the tool. `None` where positions in space mean nothing.
     pub fn of(cell: &Cell, model: &ArmModel) -> Option<Self> {
@@ -158,10 +158,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn shipped() -> ArmHull {
+    fn shipped() -> ArmBalls {
         let text = include_str!("../../../config/fr3_cell.toml");
         let cell = Cell::parse(text, "cell.toml".as_ref()).expect("the shipped cell");
-        ArmHull::of(&cell, &ArmModel::from_cell(&cell).expect("an FR3")).expect("an arm with geometry")
+        ArmBalls::of(&cell, &ArmModel::from_cell(&cell).expect("an FR3")).expect("an arm with geometry")
     }
 
     #[test]
@@ -177,14 +177,14 @@ mod tests {
     fn an_arm_of_unknown_thickness_is_a_line_and_one_of_which_only_names_are_known_is_nowhere() {
         let mut model = ArmModel::fr3();
         model.links[4].translation[1] += 0.1;
-        let hull = ArmHull::of(&Cell::default(), &model).expect("an arm with geometry");
+        let hull = ArmBalls::of(&Cell::default(), &model).expect("an arm with geometry");
         let (at, ready) = (hull.at(model.ready()), *model.ready());
         let heights: Vec<f64> = model.joint_origins(&ready)[1..7].iter().map(|origin| origin[2]).collect();
         assert!(at.lowest[..6].iter().zip(&heights).all(|(a, b)| (a - b).abs() < 1e-12));
         let flange = model.flange(&ready).position();
         assert!(at.tip.iter().zip(flange).all(|(a, b)| (a - b).abs() < 1e-12));
         let cell = Cell::parse("[robot]\njoints = [\"pan\"]\n", "cell.toml".as_ref()).expect("a cell");
-        assert!(ArmHull::of(&cell, &ArmModel::from_cell(&cell).expect("one joint")).is_none());
+        assert!(ArmBalls::of(&cell, &ArmModel::from_cell(&cell).expect("one joint")).is_none());
     }
 
     proptest! {
