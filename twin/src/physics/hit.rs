@@ -160,31 +160,14 @@ fn restitution_of(ratio: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::physics::TableObject;
+    use crate::physics::test_box::{box_model, nominal};
     use crate::physics::touch::Capsule;
-    use crate::physics::{Material, TableObject};
-    use crate::scene::{ObjectModel, ObjectShape};
     use crate::sliding::Coulomb;
     use nalgebra::{Isometry3, Point3};
-    use shared_mem::cell::Support;
 
     const TOOL: Capsule = Capsule { segment: 0.148, radius: 0.012 };
     const TOOL_MASS: f64 = 2.0;
-
-    fn box_model() -> ObjectModel {
-        ObjectModel {
-            shape: ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) },
-            mass: 0.3,
-            centre_of_mass: Vector3::zeros(),
-            friction: 0.3,
-            tip_friction: 0.2,
-            restitution: 0.0,
-            support: Support::Corners,
-        }
-    }
-
-    fn floating_box() -> TableObject<Coulomb> {
-        TableObject::new(&box_model(), Material::nominal(box_model().parameters()), None).expect("a box")
-    }
 
     /// An upright tool of [`TOOL_MASS`] that only translates, `tip` being the end of its segment.
     fn upright(tip: Point3<f64>) -> Isometry3<f64> {
@@ -205,7 +188,7 @@ mod tests {
         offset: f64,
         dt: f64,
     ) -> (Vector3<f64>, TableObject<Coulomb>, f64) {
-        let mut object = floating_box();
+        let mut object = nominal(&box_model(), None);
         let (mut tip, mut velocity) = (Point3::new(-0.054, offset, tip_height), Vector3::x() * speed);
         let (mut time, mut fallen) = (0.0, 0.0);
         while time < 0.03 {
@@ -274,8 +257,7 @@ mod tests {
     fn a_table_behind_the_object_makes_the_same_touch_push_harder() {
         // High on the face: free, the box turns away; on the table its front edge holds against that.
         let peak = |table: Option<f64>| {
-            let mut object =
-                TableObject::new(&box_model(), Material::nominal(box_model().parameters()), table).expect("a box");
+            let mut object = nominal(&box_model(), table);
             let touch = object.touch(&TOOL, &upright(Point3::new(-0.0519, 0.0, 0.045)));
             object.step(FINE, &[press(touch, Vector3::x() * 0.5, ContactLaw::nominal(0.0))])[0].x
         };

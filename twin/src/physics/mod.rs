@@ -16,6 +16,8 @@ mod push;
 mod shape;
 mod surface;
 mod table_object;
+#[cfg(test)]
+pub(crate) mod test_box;
 pub mod touch;
 mod tumble;
 

@@ -194,29 +194,11 @@ impl<'a> Approach<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::Material;
+    use crate::physics::test_box::{box_model, nominal};
     use crate::scene::{ObjectModel, ObjectShape};
-    use crate::sliding::Coulomb;
-    use shared_mem::cell::Support;
     use shared_mem::frames::Pose;
 
     const TOOL: Capsule = Capsule { segment: 0.148, radius: 0.012 };
-
-    fn box_model() -> ObjectModel {
-        ObjectModel {
-            shape: ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) },
-            mass: 0.3,
-            centre_of_mass: Vector3::zeros(),
-            friction: 0.3,
-            tip_friction: 0.2,
-            restitution: 0.0,
-            support: Support::Corners,
-        }
-    }
-
-    fn floating_box() -> TableObject<Coulomb> {
-        TableObject::new(&box_model(), Material::nominal(box_model().parameters()), None).expect("a box")
-    }
 
     /// An upright tool, `tip` being the end of its segment.
     fn upright(tip: Point3<f64>) -> Isometry3<f64> {
@@ -226,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_tool_flat_against_a_face_presses_at_both_ends_of_what_it_covers() {
-        let object = floating_box();
+        let object = nominal(&box_model(), None);
         // Segment from 0.02 below the centre upwards beyond the top at 0.05.
         let [top, tip] = object.touches(&TOOL, &upright(Point3::new(-0.0515, 0.0, -0.02)));
         for touch in [top, tip] {
@@ -239,7 +221,7 @@ mod tests {
 
     #[test]
     fn a_leaning_tool_presses_with_one_end_only() {
-        let object = floating_box();
+        let object = nominal(&box_model(), None);
         let lean = Isometry3::rotation(Vector3::y() * -0.05);
         let tip = Point3::new(-0.0515, 0.0, -0.02);
         let held = Isometry3::translation(tip.x, tip.y, tip.z) * lean * upright(Point3::origin());
@@ -250,7 +232,7 @@ mod tests {
 
     #[test]
     fn a_tool_along_an_edge_presses_at_both_ends_even_when_it_leans_a_little() {
-        let object = floating_box();
+        let object = nominal(&box_model(), None);
         let lean = Isometry3::rotation(Vector3::new(0.003, 0.0, 0.0));
         let tip = Point3::new(-0.048, -0.0385, -0.01);
         let held = Isometry3::translation(tip.x, tip.y, tip.z) * lean * upright(Point3::origin());
@@ -261,7 +243,7 @@ mod tests {
     #[test]
     fn beside_a_hull_the_nearest_place_is_where_it_is_beside_the_same_box() {
         let half = Vector3::new(0.04, 0.03, 0.05);
-        let boxed = floating_box();
+        let boxed = nominal(&box_model(), None);
         let sides = [-1.0, 1.0];
         let corner =
             |k: usize| Point3::new(sides[k & 1] * half.x, sides[(k >> 1) & 1] * half.y, sides[k >> 2] * half.z);
@@ -269,7 +251,7 @@ mod tests {
             shape: ObjectShape::Mesh { points: (0..8).map(corner).collect(), triangles: Vec::new() },
             ..box_model()
         };
-        let hull = TableObject::new(&model, Material::nominal(model.parameters()), None).expect("a hull");
+        let hull = nominal(&model, None);
         let mut outside = 0;
         for step in 0..500 {
             let wave = |k: f64| (f64::from(step) * k).sin();
@@ -288,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_tool_away_from_the_object_reports_the_gap() {
-        let mut object = floating_box();
+        let mut object = nominal(&box_model(), None);
         object.set(&Pose::from_isometry(Isometry3::translation(0.5, 0.0, 0.0)), Vector3::zeros(), Vector3::zeros());
         let touch = object.touch(&TOOL, &upright(Point3::new(0.348, 0.0, 0.0)));
         assert!((touch.depth + 0.1).abs() < 1e-9, "{}", touch.depth);

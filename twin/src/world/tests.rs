@@ -54,21 +54,10 @@ fn a_box_slides_as_far_as_coulomb_says() {
 /// Travel and yaw of a spinning box on its four corners: the twin's sliding law, by its own code.
 #[test]
 fn a_spinning_box_slides_and_turns_as_the_sliding_law_says() {
-    use crate::physics::{Material, TableObject};
-    use crate::scene::{ObjectModel, ObjectShape};
-    use shared_mem::cell::Support;
+    use crate::physics::test_box::{box_model, nominal};
     use shared_mem::frames::Pose;
-    let model = ObjectModel {
-        shape: ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) },
-        mass: 0.3,
-        centre_of_mass: Vector3::zeros(),
-        friction: 0.3,
-        tip_friction: 0.0,
-        restitution: 0.0,
-        support: Support::Corners,
-    };
     let (velocity, spin) = (Vector3::new(0.6, 0.0, 0.0), Vector3::new(0.0, 0.0, 6.0));
-    let mut law = TableObject::new(&model, Material::nominal(model.parameters()), Some(0.0)).expect("a box");
+    let mut law = nominal(&box_model(), Some(0.0));
     law.set(&Pose::from_isometry(Isometry3::translation(0.0, 0.0, 0.05)), velocity, spin);
     let bodies = [table(0.3), block("box", [0.08, 0.06, 0.1], 0.3, free(0.0, 0.0, 0.05))];
     let mut world = World::new(&bodies).expect("a world");

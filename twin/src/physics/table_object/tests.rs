@@ -1,26 +1,20 @@
 //! How an object rests, falls, slides, topples and bounces.
 
 use super::*;
-use crate::scene::ObjectShape;
+use crate::physics::test_box::{self, nominal};
 use crate::sliding::Coulomb;
 use shared_mem::cell::GRAVITY;
 
 const STEP: f64 = 2.5e-4;
 
+/// The box with its centre of mass off its middle.
 fn box_model(friction: f64, restitution: f64) -> ObjectModel {
-    ObjectModel {
-        shape: ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) },
-        mass: 0.3,
-        centre_of_mass: Vector3::new(0.005, -0.004, 0.003),
-        friction,
-        tip_friction: 0.2,
-        restitution,
-        support: Support::Corners,
-    }
+    let centre_of_mass = Vector3::new(0.005, -0.004, 0.003);
+    ObjectModel { centre_of_mass, friction, restitution, ..test_box::box_model() }
 }
 
 fn placed(model: &ObjectModel, pose: Isometry3<f64>, velocity: Vector3<f64>) -> TableObject<Coulomb> {
-    let mut object = TableObject::new(model, Material::nominal(model.parameters()), Some(0.0)).expect("a box");
+    let mut object = nominal(model, Some(0.0));
     object.set(&Pose::from_isometry(pose), velocity, Vector3::zeros());
     object
 }
@@ -74,8 +68,7 @@ fn a_dropped_box_does_not_hover() {
 
 #[test]
 fn a_falling_box_follows_gravity() {
-    let model = box_model(0.3, 0.0);
-    let mut object = TableObject::new(&model, Material::nominal(model.parameters()), None).expect("a box");
+    let mut object = nominal(&box_model(0.3, 0.0), None);
     object.set(&Pose::from_isometry(Isometry3::translation(0.0, 0.0, 5.0)), Vector3::x(), Vector3::z() * 2.0);
     run(&mut object, 0.5);
     let fallen = 5.0 - height(&object);
@@ -89,8 +82,7 @@ fn velocities_are_those_of_the_geometric_centre() {
         nalgebra::Translation3::new(0.3, 0.2, 1.0),
         UnitQuaternion::from_euler_angles(0.3, 0.2, 1.0),
     );
-    let model = box_model(0.3, 0.0);
-    let mut object = TableObject::new(&model, Material::nominal(model.parameters()), None).expect("a box");
+    let mut object = nominal(&box_model(0.3, 0.0), None);
     let (velocity, spin) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, -2.0, 3.0));
     object.set(&Pose::from_isometry(turned), velocity, spin);
     let centre = Point3::from(turned.translation.vector);
@@ -150,8 +142,8 @@ fn on_feet_a_box_topples_from_a_slope_on_which_its_corners_hold_it() {
         let model = box_model(1.0, 0.0);
         // Down on a table that leans by 0.3 rad about its x axis.
         let gravity = Vector3::new(0.0, 0.3f64.sin(), -0.3f64.cos()) * GRAVITY;
-        let nominal = Material::nominal(model.parameters());
-        let made_of = Material { gravity, pressure_reach: 0.4, pivot_reach: pivot, ..nominal };
+        let level = Material::nominal(model.parameters());
+        let made_of = Material { gravity, pressure_reach: 0.4, pivot_reach: pivot, ..level };
         let mut object = TableObject::new(&model, made_of, Some(0.0)).expect("a box");
         object.set(&Pose::from_isometry(Isometry3::translation(0.0, 0.0, 0.05)), Vector3::zeros(), Vector3::zeros());
         run(&mut object, 1.0);
