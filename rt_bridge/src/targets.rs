@@ -3,7 +3,7 @@
 //! joints, and none of a stream that cannot steer.
 
 use crate::motion::Target;
-use crate::remark::Said;
+use crate::remark::Newest;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use shared_mem::msg::Joints;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
@@ -26,7 +26,7 @@ pub struct Targets {
     /// Stream and joints of the last pose: while it steers, the next one's are searched from there.
     last: Option<(u64, Joints)>,
     /// Streams whose fault was said.
-    said: Said<u64>,
+    said: Newest<u64>,
 }
 
 /// A stream's targets do not count.
@@ -50,7 +50,7 @@ impl std::fmt::Display for Fault {
 impl Targets {
     /// For an arm.
     pub fn new(model: ArmModel, limits: Limits) -> Self {
-        Self { model, limits, waiting: VecDeque::with_capacity(STREAMS + 1), last: None, said: Said::default() }
+        Self { model, limits, waiting: VecDeque::with_capacity(STREAMS + 1), last: None, said: Newest::default() }
     }
 
     /// Keeps a target that was just received, with the arm in this state, in the place of an earlier one of its stream. The

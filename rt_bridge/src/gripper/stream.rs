@@ -1,7 +1,7 @@
 //! Streams of targets for the fingers: one sender at a time, sent to the device where it changes. After a stop none of them
 //! moves the fingers before all were silent, as with the arm.
 
-use crate::remark::Said;
+use crate::remark::Newest;
 use shared_mem::msg::gripper::{GripperAction, GripperCommand};
 use shared_mem::msg::motion::STOP_SILENCE_NS;
 use shared_mem::msg::target::{GripperTarget, SILENCE_NS};
@@ -18,7 +18,7 @@ pub(super) struct Fingers {
     stream: u64,
     heard_ns: u64,
     sent: Option<GripperTarget>,
-    refused: Said<u64>,
+    refused: Newest<u64>,
     /// When a stop was asked for, or a target came last after it.
     stopped_ns: Option<u64>,
 }
@@ -42,7 +42,7 @@ impl Fingers {
             return self.refuse(target.stream, &format!("stream {} moves the fingers; end it first", self.stream));
         }
         if target.stream != self.stream {
-            (self.stream, self.sent, self.refused) = (target.stream, None, Said::default());
+            (self.stream, self.sent, self.refused) = (target.stream, None, Newest::default());
         }
         self.heard_ns = now_ns;
         let known = self.sent.is_some_and(|sent| {
@@ -74,7 +74,7 @@ impl Fingers {
     pub(super) fn give_way(&mut self, command: &GripperCommand, now_ns: u64) {
         self.sent = None;
         if command.action == GripperAction::Stop {
-            (self.stopped_ns, self.refused) = (Some(now_ns), Said::default());
+            (self.stopped_ns, self.refused) = (Some(now_ns), Newest::default());
         }
     }
 }

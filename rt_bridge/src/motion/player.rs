@@ -19,7 +19,7 @@ pub use stream::Target;
 
 use super::ease::Ease;
 use super::{Brake, lost};
-use crate::remark::{BrakeReason, Refusal, Remark, Said};
+use crate::remark::{BrakeReason, Newest, Refusal, Remark};
 use crate::safety::{Guard, Measured, Outside, Trace};
 use queue::Queue;
 use shared_mem::msg::arm::{ArmState, MotionStatus};
@@ -66,7 +66,7 @@ pub struct Player {
     has_last: bool,
     played: u32,
     /// Motions whose further chunks and targets are dropped without a word: they were refused or braked.
-    dropped: Said<u64>,
+    dropped: Newest<u64>,
 }
 
 impl Player {
@@ -90,7 +90,7 @@ impl Player {
             due_index: 0,
             has_last: false,
             played: 0,
-            dropped: Said::default(),
+            dropped: Newest::default(),
         }
     }
 

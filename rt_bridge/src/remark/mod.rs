@@ -1,12 +1,12 @@
 //! What the control thread has to tell people: `Copy` values that go through a ring to the pump, which words them.
 
 mod claim;
-mod said;
+mod newest;
 
 use crate::arm::ArmFault;
 use crate::safety::Violation;
 pub use claim::Claim;
-pub use said::Said;
+pub use newest::Newest;
 use shared_mem::msg::event::EventLevel;
 use std::fmt;
 

@@ -197,8 +197,8 @@ mod tests {
             let arm = Measured { outside: space.outside_measured(&LOW), ..Measured::at_rest(&state, &trace.q, &space) };
             let kept = Measured { hangs: [0.0; MAX_JOINTS], ..arm }.keeps(&trace, &lab.trailing, &space, &lab.limits, T);
             if is_at_table && space.room(&LOW) >= 0.0 {
-                let untold = MARGIN * (space.room(&state.q) - gap);
-                prop_assert!(kept || gap < 1e-3 + untold, "{gap} m of room are not seen");
+                let margin = MARGIN * (space.room(&state.q) - gap);
+                prop_assert!(kept || gap < 1e-3 + margin, "{gap} m of room are not seen");
                 prop_assert!(!kept || gap > -1.5e-3, "{gap} m of room were not missed");
             }
         }

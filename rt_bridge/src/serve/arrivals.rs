@@ -2,7 +2,7 @@
 //! that somebody who connects and stays silent, or sends half a header, keeps nobody from the robot; such a connection is
 //! closed after two seconds. Used for the arm's port and the hand's.
 
-use super::connection::{Gone, read_into};
+use super::connection::{ConnectionEnd, read_into};
 use super::framing::{Inbox, Message};
 use socket2::{SockRef, TcpKeepalive};
 use std::collections::VecDeque;
@@ -37,7 +37,7 @@ pub(super) enum Outcome {
     /// Its first request is there.
     Asks(Arrival, Message),
     /// It is closed.
-    Closed(SocketAddr, Gone),
+    Closed(SocketAddr, ConnectionEnd),
 }
 
 /// The connections that are still silent.
@@ -77,20 +77,21 @@ impl Arrivals {
             }
         }
         while self.silent.len() > MAX_SILENT {
-            outcomes.extend(self.silent.pop_front().map(|arrival| Outcome::Closed(arrival.peer, Gone::Crowded)));
+            outcomes
+                .extend(self.silent.pop_front().map(|arrival| Outcome::Closed(arrival.peer, ConnectionEnd::Crowded)));
         }
         outcomes
     }
 }
 
 impl Arrival {
-    fn first_request(&mut self, now: Instant) -> Result<Option<Message>, Gone> {
+    fn first_request(&mut self, now: Instant) -> Result<Option<Message>, ConnectionEnd> {
         let read = read_into(&mut self.tcp, &mut self.inbox);
         // Also where it has left already: what it was is counted.
-        let message = self.inbox.next().map_err(|garbage| Gone::Nonsense(garbage.to_string()))?;
+        let message = self.inbox.next().map_err(|garbage| ConnectionEnd::Nonsense(garbage.to_string()))?;
         read?;
         match message {
-            None if now.duration_since(self.since) > PATIENCE => Err(Gone::Silent),
+            None if now.duration_since(self.since) > PATIENCE => Err(ConnectionEnd::Silent),
             message => Ok(message),
         }
     }
@@ -136,7 +137,7 @@ mod tests {
         assert!(SockRef::from(&arrival.tcp).keepalive().expect("a socket"));
         assert!(arrivals.look(begin + PATIENCE).is_empty());
         let late = outcomes(&mut arrivals, begin + 2 * PATIENCE, 2);
-        assert!(late.iter().all(|outcome| matches!(outcome, Outcome::Closed(_, Gone::Silent))), "{late:?}");
+        assert!(late.iter().all(|outcome| matches!(outcome, Outcome::Closed(_, ConnectionEnd::Silent))), "{late:?}");
         drop((silent, half));
     }
 
@@ -156,7 +157,7 @@ mod tests {
         }
         let first = clients[..10].iter().map(|client| client.local_addr().expect("connected"));
         for (client, outcome) in first.zip(&closed) {
-            assert!(matches!(outcome, Outcome::Closed(peer, Gone::Crowded) if *peer == client), "{outcome:?}");
+            assert!(matches!(outcome, Outcome::Closed(peer, ConnectionEnd::Crowded) if *peer == client), "{outcome:?}");
         }
         assert_eq!((arrivals.silent.len(), closed.len()), (MAX_SILENT, 10));
     }

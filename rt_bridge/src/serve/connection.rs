@@ -10,7 +10,7 @@ pub(super) const READS: usize = 64;
 
 /// Why a connection is over.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(super) enum Gone {
+pub(super) enum ConnectionEnd {
     /// In the ordinary way.
     #[error("it closed the connection")]
     Left,
@@ -36,23 +36,23 @@ pub(super) enum Gone {
     Broken(io::ErrorKind),
 }
 
-impl From<io::Error> for Gone {
+impl From<io::Error> for ConnectionEnd {
     fn from(error: io::Error) -> Self {
         Self::Broken(error.kind())
     }
 }
 
 /// Takes all bytes that have arrived.
-pub(super) fn read_into(tcp: &mut TcpStream, inbox: &mut Inbox) -> Result<(), Gone> {
+pub(super) fn read_into(tcp: &mut TcpStream, inbox: &mut Inbox) -> Result<(), ConnectionEnd> {
     let mut bytes = [0; 2048];
     // Not without end: somebody who never stops sending must not stop the robot's clock.
     for _ in 0..READS {
         match tcp.read(&mut bytes) {
-            Ok(0) => return Err(Gone::Left),
+            Ok(0) => return Err(ConnectionEnd::Left),
             Ok(length) => inbox.put(&bytes[..length]),
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(Gone::Broken(error.kind())),
+            Err(error) => return Err(ConnectionEnd::Broken(error.kind())),
         }
     }
     Ok(())

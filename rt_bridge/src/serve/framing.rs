@@ -17,7 +17,7 @@ pub(super) struct Message {
 /// A header that announces a length no message has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("a message of {0} bytes is none of this protocol")]
-pub(super) struct Garbage(u32);
+pub(super) struct InvalidLength(u32);
 
 /// Bytes that have arrived and are not a whole message yet.
 #[derive(Debug)]
@@ -43,11 +43,11 @@ impl Inbox {
     }
 
     /// The next whole message, if there is one.
-    pub(super) fn next(&mut self) -> Result<Option<Message>, Garbage> {
+    pub(super) fn next(&mut self) -> Result<Option<Message>, InvalidLength> {
         let Some((number, id, size)) = self.layout.decode_header(&self.bytes) else { return Ok(None) };
         let (header, length) = (self.layout.header_len(), size as usize);
         if !(header..=LONGEST).contains(&length) {
-            return Err(Garbage(size));
+            return Err(InvalidLength(size));
         }
         if self.bytes.len() < length {
             return Ok(None);
@@ -65,7 +65,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// All messages of a stream that arrives in pieces of these lengths.
-    fn messages(stream: &[u8], pieces: &[usize]) -> Result<Vec<Message>, Garbage> {
+    fn messages(stream: &[u8], pieces: &[usize]) -> Result<Vec<Message>, InvalidLength> {
         let (mut inbox, mut found, mut rest) = (Inbox::of_the_arm(), Vec::new(), stream);
         let mut lengths = pieces.iter().cycle();
         while !rest.is_empty() {

@@ -1,7 +1,7 @@
 //! What a client can send, without its sockets and its clock: for the fuzz targets, and for the tests of what they found.
 //! Compiled for these two alone; no built program has it.
 
-use super::framing::{Garbage, Inbox, Message};
+use super::framing::{Inbox, InvalidLength, Message};
 use super::hand::wire as hand_wire;
 use super::robot::Robot;
 use super::wire::{request, set_point};
@@ -75,7 +75,7 @@ pub fn arm(input: &[u8]) -> u64 {
 }
 
 /// The messages that are whole with these bytes.
-fn arrived(inbox: &mut Inbox, bytes: &[u8]) -> Result<Vec<Message>, Garbage> {
+fn arrived(inbox: &mut Inbox, bytes: &[u8]) -> Result<Vec<Message>, InvalidLength> {
     inbox.put(bytes);
     let mut messages = Vec::new();
     while let Some(message) = inbox.next()? {

@@ -8,7 +8,7 @@
 
 use super::ServeError;
 use super::arrivals::{Arrivals, Outcome};
-use super::connection::Gone;
+use super::connection::ConnectionEnd;
 use super::framing::Inbox;
 use super::hand::HandService;
 use super::notices::{About, Notices};
@@ -206,7 +206,7 @@ impl Server {
                     self.notices.info(About::Client, format_args!("{peer} is connected"));
                 }
                 // Somebody who only looked whether a robot listens here.
-                Err(Gone::Left) => {}
+                Err(ConnectionEnd::Left) => {}
                 Err(gone) => {
                     self.refused += 1;
                     self.notices.warn(About::Refusal, format_args!("{peer}: {gone}"));
@@ -233,13 +233,13 @@ impl Server {
         }
     }
 
-    fn keep_or_part(&mut self, served: Result<(), Gone>) {
+    fn keep_or_part(&mut self, served: Result<(), ConnectionEnd>) {
         if let Err(gone) = served {
             self.session = None;
             self.robot.client_left();
             let line = format_args!("the client is gone: {gone}");
             match gone {
-                Gone::Left => self.notices.info(About::Client, line),
+                ConnectionEnd::Left => self.notices.info(About::Client, line),
                 _ => self.notices.warn(About::Client, line),
             }
         }
@@ -257,7 +257,7 @@ impl Server {
                 return set_point;
             }
             // Only to sleep until something is there: the next look takes it.
-            let waited = self.session.as_ref().map_or(Err(Gone::Left), |session| session.wait(LOOK_EVERY));
+            let waited = self.session.as_ref().map_or(Err(ConnectionEnd::Left), |session| session.wait(LOOK_EVERY));
             self.keep_or_part(waited);
             self.attend();
         }

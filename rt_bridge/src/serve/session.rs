@@ -4,7 +4,7 @@
 //! set points.
 
 use super::arrivals::Arrival;
-use super::connection::{Gone, READS, read_into};
+use super::connection::{ConnectionEnd, READS, read_into};
 use super::framing::{Inbox, Message};
 use super::notices::{About, Notices};
 use super::robot::{Outbox, Reply, Robot};
@@ -33,15 +33,15 @@ pub(super) struct Session {
 
 impl Session {
     /// Answers the first `message` of a connection, which has to be a handshake; `taken` where somebody else is served.
-    pub(super) fn open(arrival: Arrival, message: &Message, taken: bool) -> Result<Self, Gone> {
+    pub(super) fn open(arrival: Arrival, message: &Message, taken: bool) -> Result<Self, ConnectionEnd> {
         let Arrival { mut tcp, peer, inbox, .. } = arrival;
         let Ok(Request::Connect { version, udp_port }) = request(message.number, &message.payload) else {
-            return Err(Gone::Nonsense("it asks for something before the handshake".into()));
+            return Err(ConnectionEnd::Nonsense("it asks for something before the handshake".into()));
         };
         let (answer, refused) = if version != ROBOT_VERSION {
-            (connect_reply(ConnectStatus::IncompatibleLibraryVersion), Some(Gone::Version(version)))
+            (connect_reply(ConnectStatus::IncompatibleLibraryVersion), Some(ConnectionEnd::Version(version)))
         } else if taken {
-            (busy_reply(), Some(Gone::Second))
+            (busy_reply(), Some(ConnectionEnd::Second))
         } else {
             (connect_reply(ConnectStatus::Success), None)
         };
@@ -59,9 +59,9 @@ impl Session {
     }
 
     /// Hands the requests that have arrived to the robot and sends what it answers at once.
-    pub(super) fn serve(&mut self, robot: &mut Robot, notices: &mut Notices) -> Result<(), Gone> {
+    pub(super) fn serve(&mut self, robot: &mut Robot, notices: &mut Notices) -> Result<(), ConnectionEnd> {
         read_into(&mut self.tcp, &mut self.inbox)?;
-        while let Some(message) = self.inbox.next().map_err(|garbage| Gone::Nonsense(garbage.to_string()))? {
+        while let Some(message) = self.inbox.next().map_err(|garbage| ConnectionEnd::Nonsense(garbage.to_string()))? {
             self.take(&message, robot, notices)?;
         }
         // At once: a client in lock-step may want its answer before it lets the robot's clock go on.
@@ -69,10 +69,10 @@ impl Session {
         before_state.iter().chain(&after_state).try_for_each(|reply| self.send(reply))
     }
 
-    fn take(&mut self, message: &Message, robot: &mut Robot, notices: &mut Notices) -> Result<(), Gone> {
+    fn take(&mut self, message: &Message, robot: &mut Robot, notices: &mut Notices) -> Result<(), ConnectionEnd> {
         let Message { number, id, payload } = message;
         match request(*number, payload) {
-            Ok(Request::Connect { .. }) => Err(Gone::Nonsense("it sends a second handshake".into())),
+            Ok(Request::Connect { .. }) => Err(ConnectionEnd::Nonsense("it sends a second handshake".into())),
             Ok(request) => {
                 robot.request(*number, *id, &request);
                 Ok(())
@@ -86,7 +86,7 @@ impl Session {
     }
 
     /// Sends replies that go out before a state, the state, and those that go out after it.
-    pub(super) fn report(&mut self, robot: &mut Robot) -> Result<(), Gone> {
+    pub(super) fn report(&mut self, robot: &mut Robot) -> Result<(), ConnectionEnd> {
         let outbox = robot.outbox();
         outbox.before_state.iter().try_for_each(|reply| self.send(reply))?;
         // A client that does not listen yet or any more is noticed by its other socket.
@@ -94,7 +94,7 @@ impl Session {
         outbox.after_state.iter().try_for_each(|reply| self.send(reply))
     }
 
-    fn send(&mut self, answer: &Reply) -> Result<(), Gone> {
+    fn send(&mut self, answer: &Reply) -> Result<(), ConnectionEnd> {
         send(&mut self.tcp, answer.number, answer.id, &answer.payload)
     }
 
@@ -117,7 +117,7 @@ impl Session {
     }
 
     /// Sleeps until a datagram is there, `patience` at most.
-    pub(super) fn wait(&self, patience: Duration) -> Result<(), Gone> {
+    pub(super) fn wait(&self, patience: Duration) -> Result<(), ConnectionEnd> {
         self.udp.set_nonblocking(false)?;
         self.udp.set_read_timeout(Some(patience))?;
         let _something = self.udp.peek(&mut [0; 1]);
@@ -125,7 +125,7 @@ impl Session {
     }
 }
 
-fn send(tcp: &mut TcpStream, number: u32, id: u32, payload: &[u8]) -> Result<(), Gone> {
+fn send(tcp: &mut TcpStream, number: u32, id: u32, payload: &[u8]) -> Result<(), ConnectionEnd> {
     // Replies are a few bytes, the longest some kilobytes: a client that leaves no room for one reads none.
     Ok(tcp.write_all(&reply(number, id, payload))?)
 }

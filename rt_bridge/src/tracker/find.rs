@@ -57,7 +57,7 @@ impl Occupied {
 
 /// One heap on the table.
 #[derive(Debug, Clone)]
-struct Heap {
+struct Cluster {
     /// Its pixels.
     pixels: Vec<[u16; 2]>,
     /// Mean of its points, base frame [m].
@@ -66,16 +66,16 @@ struct Heap {
 
 /// A search under way.
 #[derive(Debug, Clone)]
-pub(super) struct Hunt {
+pub(super) struct PlaceSearch {
     /// Heaps that nobody has looked into, the largest last.
-    left: Vec<Heap>,
+    left: Vec<Cluster>,
     /// The heap that is looked into, and poses in which the object may be there.
-    ranked: Option<(Heap, Vec<Isometry3<f64>>)>,
+    ranked: Option<(Cluster, Vec<Isometry3<f64>>)>,
     /// The poses that explain one heap and do so best, the best first.
     best: Vec<(Fit, Verdict)>,
 }
 
-impl Hunt {
+impl PlaceSearch {
     /// Whether everything was looked into.
     pub(super) fn is_over(&self) -> bool {
         self.left.is_empty() && self.ranked.is_none()
@@ -89,17 +89,17 @@ impl Hunt {
 
 impl Scene<'_> {
     /// Begins to look for the object in the whole picture, but for where others are followed.
-    pub(super) fn begin_hunt(&self, view: &View, frame: &Frame, arm: Arm, others: &[Occupied]) -> Hunt {
+    pub(super) fn begin_hunt(&self, view: &View, frame: &Frame, arm: Arm, others: &[Occupied]) -> PlaceSearch {
         let mut left = self.heaps(view, frame, arm);
         left.retain(|heap| !others.iter().any(|other| other.holds(&heap.middle)));
         left.reverse();
-        let mut hunt = Hunt { left, ranked: None, best: Vec::new() };
+        let mut hunt = PlaceSearch { left, ranked: None, best: Vec::new() };
         self.go_on(&mut hunt, view, frame, arm);
         hunt
     }
 
     /// The next step of a search.
-    pub(super) fn go_on(&self, hunt: &mut Hunt, view: &View, frame: &Frame, arm: Arm) {
+    pub(super) fn go_on(&self, hunt: &mut PlaceSearch, view: &View, frame: &Frame, arm: Arm) {
         match hunt.ranked.take() {
             Some((heap, starts)) => {
                 let fits = self.fit(view, frame, arm, &heap, &starts);
@@ -155,7 +155,7 @@ impl Scene<'_> {
     }
 
     /// What rises from the table, the largest heap first.
-    fn heaps(&self, view: &View, frame: &Frame, arm: Arm) -> Vec<Heap> {
+    fn heaps(&self, view: &View, frame: &Frame, arm: Arm) -> Vec<Cluster> {
         let (width, height) = (view.width / EVERY, view.height / EVERY);
         let robot = robot(view, arm, width, height);
         let mut rises = vec![0.0_f32; width * height];
@@ -188,7 +188,7 @@ impl Scene<'_> {
     }
 
     /// `None` where a heap is too large to be the object.
-    fn heap(&self, view: &View, frame: &Frame, pixels: Vec<[u16; 2]>) -> Option<Heap> {
+    fn heap(&self, view: &View, frame: &Frame, pixels: Vec<[u16; 2]>) -> Option<Cluster> {
         let points: Vec<Vector3<f64>> = pixels
             .iter()
             .map(|[u, v]| {
@@ -200,11 +200,11 @@ impl Scene<'_> {
             .collect();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
         let within = points.iter().filter(|p| (*p - middle).norm() < 1.5 * self.model.radius).count();
-        (2 * within > points.len()).then_some(Heap { pixels, middle })
+        (2 * within > points.len()).then_some(Cluster { pixels, middle })
     }
 
     /// The poses in which the object, standing on the table, looks most like a heap.
-    fn rank(&self, view: &View, frame: &Frame, arm: Arm, heap: &Heap) -> Vec<Isometry3<f64>> {
+    fn rank(&self, view: &View, frame: &Frame, arm: Arm, heap: &Cluster) -> Vec<Isometry3<f64>> {
         let Some(mut patch) = self.around(view, frame, arm, heap) else { return Vec::new() };
         let mut starts: Vec<(f64, Isometry3<f64>)> = candidates(self.model)
             .filter_map(|rotation| {
@@ -223,7 +223,14 @@ impl Scene<'_> {
     }
 
     /// The object's poses that explain a heap, the best first: all are fitted roughly, the best of them to the end.
-    fn fit(&self, view: &View, frame: &Frame, arm: Arm, heap: &Heap, starts: &[Isometry3<f64>]) -> Vec<(Fit, Verdict)> {
+    fn fit(
+        &self,
+        view: &View,
+        frame: &Frame,
+        arm: Arm,
+        heap: &Cluster,
+        starts: &[Isometry3<f64>],
+    ) -> Vec<(Fit, Verdict)> {
         let Some(mut patch) = self.around(view, frame, arm, heap) else { return Vec::new() };
         let mut rough: Vec<(f64, Isometry3<f64>)> = starts
             .iter()
@@ -252,7 +259,7 @@ impl Scene<'_> {
         fits
     }
 
-    fn around(&self, view: &View, frame: &Frame, arm: Arm, heap: &Heap) -> Option<Patch> {
+    fn around(&self, view: &View, frame: &Frame, arm: Arm, heap: &Cluster) -> Option<Patch> {
         let centre = view.base_from_camera.inverse() * nalgebra::Point3::from(heap.middle);
         Patch::around(view, self.table, frame, arm, &centre.coords, 2.0 * self.model.radius)
     }
@@ -268,7 +275,7 @@ impl Scene<'_> {
         &self,
         patch: &mut Patch,
         view: &View,
-        heap: &Heap,
+        heap: &Cluster,
         rotation: &UnitQuaternion<f64>,
     ) -> Option<Isometry3<f64>> {
         let camera_from_base = view.base_from_camera.inverse();
@@ -317,7 +324,7 @@ fn candidates(model: &Model) -> impl Iterator<Item = UnitQuaternion<f64>> {
 }
 
 /// The share of a heap's pixels that the drawn object explains.
-fn explained(patch: &Patch, heap: &Heap, noise: f32) -> f64 {
+fn explained(patch: &Patch, heap: &Cluster, noise: f32) -> f64 {
     let matches = heap.pixels.iter().filter(|[u, v]| {
         let Some(at) = patch.local(usize::from(*u), usize::from(*v)) else { return false };
         let drawn = patch.drawn()[at];

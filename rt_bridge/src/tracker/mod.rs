@@ -43,7 +43,7 @@ pub use view::{Frame, View};
 use align::{FINE, Fit, Scene};
 use arm::ArmBody;
 use colors::Colors;
-use find::{Hunt, Occupied};
+use find::{Occupied, PlaceSearch};
 use judge::Verdict;
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
 use patch::Patch;
@@ -71,7 +71,7 @@ pub struct Tracker {
     last: Option<Seen>,
     lost_for: u32,
     /// A search under way.
-    hunt: Option<Hunt>,
+    hunt: Option<PlaceSearch>,
 }
 
 /// The last pose.

@@ -82,7 +82,7 @@ pub fn serve(cell: &Cell, notices: Sender<Notice>) -> Result<Service, TrackerErr
             }
         };
         let _gone = opened.send(Ok(()));
-        let mut desk = Desk { followed, latency_ns, notices };
+        let mut desk = Trackers { followed, latency_ns, notices };
         if let Err(e) = desk.run(&ports, &stopping) {
             tracing::error!("the tracker stopped: {e}");
         }
@@ -119,7 +119,7 @@ impl Ports {
 }
 
 /// The trackers at work.
-struct Desk {
+struct Trackers {
     followed: Vec<Followed>,
     /// From a picture to its arrival.
     latency_ns: u64,
@@ -148,7 +148,7 @@ impl Followed {
     }
 }
 
-impl Desk {
+impl Trackers {
     fn run(&mut self, ports: &Ports, stop: &AtomicBool) -> Result<(), TransportError> {
         let mut states: VecDeque<(u64, Joints)> = VecDeque::with_capacity(STATES);
         let (mut depth, mut color): (Option<ImageSample>, Option<ImageSample>) = (None, None);

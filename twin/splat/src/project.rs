@@ -37,7 +37,7 @@ pub struct Projected<T = f64> {
 
 /// A Gaussian in the frame of its body, without its colour.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Bell<T: Real> {
+pub(super) struct Gaussian<T: Real> {
     /// Centre [m].
     pub(super) centre: Vector3<T>,
     /// Quaternion w, x, y, z of any length but 0: from its own axes to the body's.
@@ -102,7 +102,7 @@ impl<T: Real> View<T> {
     }
 
     /// The splat behind this camera; `None` when it is behind the camera or too faint.
-    pub(super) fn forward(&self, bell: &Bell<T>) -> Option<Forward<T>> {
+    pub(super) fn forward(&self, bell: &Gaussian<T>) -> Option<Forward<T>> {
         let at = self.rotation * bell.centre + self.translation;
         if at.z < T::of(NEAREST) || bell.opacity < T::of(FAINTEST) {
             return None;
@@ -126,14 +126,19 @@ impl<T: Real> View<T> {
     }
 
     /// From the camera to the splat, body frame: the direction of length 1, and how far.
-    pub(super) fn direction(&self, bell: &Bell<T>) -> ([T; 3], T) {
+    pub(super) fn direction(&self, bell: &Gaussian<T>) -> ([T; 3], T) {
         let way = bell.centre - self.eye;
         let far = way.norm();
         ((way / far).into(), far)
     }
 
     /// The splat in the picture; `None` when it is behind the camera, beside the picture, or too faint.
-    pub(super) fn project<H: Real>(&self, bell: &Bell<T>, degree: usize, harmonics: &[[H; 3]]) -> Option<Projected<T>> {
+    pub(super) fn project<H: Real>(
+        &self,
+        bell: &Gaussian<T>,
+        degree: usize,
+        harmonics: &[[H; 3]],
+    ) -> Option<Projected<T>> {
         let Forward { at, covariance, pixel, .. } = self.forward(bell)?;
         let inverse = covariance.try_inverse()?;
         // opacity exp(-d²/2) = 1/255 on an ellipse; its extent along an axis is d times that axis's sigma.
@@ -207,7 +212,7 @@ pub fn project(
 pub(super) fn project_from(cloud: &SplatCloud, number: usize, view: &View<f64>) -> Option<Projected> {
     let splat = cloud.splats.get(number)?;
     let turn = splat.rotation.quaternion();
-    let bell = Bell {
+    let bell = Gaussian {
         centre: splat.centre.coords.cast(),
         turn: [turn.w, turn.i, turn.j, turn.k].map(f64::from),
         sigma: splat.sigma.cast(),

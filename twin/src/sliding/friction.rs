@@ -1,4 +1,4 @@
-//! The seam between the sliding law and what the table is made of: what rubs at one place at one slip velocity.
+//! The seam between the sliding law and what the table is made of: the coefficient at one place and one slip velocity.
 //!
 //! [`Coulomb`] is the nominal table. A table that is rougher along one axis, beyond a line or at low speed is another
 //! type with the same method; the law around it stays as it is.

@@ -204,11 +204,11 @@ struct Page {
 }
 
 /// The page is gone, or as good as gone.
-struct Left;
+struct PageClosed;
 
 impl Page {
     /// Its messages in, pictures out, as fast as it takes them.
-    async fn attend(mut self) -> Result<(), Left> {
+    async fn attend(mut self) -> Result<(), PageClosed> {
         let mut frames = self.shared.frames.clone();
         let hello = self.shared.hello.as_ref().into();
         self.say(Message::Text(hello)).await?;
@@ -224,17 +224,17 @@ impl Page {
             tokio::select! {
                 message = self.socket.recv(), if self.heard < HEARD => match message {
                     Some(Ok(message)) => self.hear(message).await?,
-                    Some(Err(_)) | None => return Err(Left),
+                    Some(Err(_)) | None => return Err(PageClosed),
                 },
                 changed = frames.changed() => {
-                    changed.map_err(|_| Left)?;
+                    changed.map_err(|_| PageClosed)?;
                     let frame = frames.borrow_and_update().clone();
                     (self.heard, self.is_warned) = (0, false);
                     self.say(Message::Binary(frame)).await?;
                 }
                 _ = ask.tick() => {
                     if self.unanswered >= UNANSWERED {
-                        return Err(Left);
+                        return Err(PageClosed);
                     }
                     self.unanswered += 1;
                     self.say(Message::Ping(Bytes::new())).await?;
@@ -243,14 +243,14 @@ impl Page {
         }
     }
 
-    async fn say(&mut self, message: Message) -> Result<(), Left> {
+    async fn say(&mut self, message: Message) -> Result<(), PageClosed> {
         match tokio::time::timeout(TAKES_NOTHING, self.socket.send(message)).await {
             Ok(Ok(())) => Ok(()),
-            Ok(Err(_)) | Err(_) => Err(Left),
+            Ok(Err(_)) | Err(_) => Err(PageClosed),
         }
     }
 
-    async fn hear(&mut self, message: Message) -> Result<(), Left> {
+    async fn hear(&mut self, message: Message) -> Result<(), PageClosed> {
         (self.unanswered, self.heard) = (0, self.heard + 1);
         let line = match message {
             Message::Text(text) => match self.take(&text) {
@@ -259,7 +259,7 @@ impl Page {
             },
             Message::Binary(_) => "not a message: it is binary; send JSON as text".to_owned(),
             Message::Ping(_) | Message::Pong(_) => return Ok(()),
-            Message::Close(_) => return Err(Left),
+            Message::Close(_) => return Err(PageClosed),
         };
         self.say(Message::Text(serde_json::json!({ "error": line }).to_string().into())).await
     }

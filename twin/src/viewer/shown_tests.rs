@@ -106,13 +106,13 @@ fn shown(name: &str, cell: &Cell, viewers: usize, enough: impl Fn(&Seen) -> bool
         let node = Node::open_in(&shown_domain, "twin_viewer").expect("shared memory");
         viewer.run_on(&node, &stopped)
     });
-    let told = stop.clone();
+    let stopping = stop.clone();
     let robot = std::thread::spawn(move || {
         let node = Node::open_in(&domain, "robot").expect("shared memory");
         let (arm, twin) = (node.publisher(ARM_STATE).expect("a place"), node.publisher(TWIN_STATE).expect("a place"));
         let (camera, poses) =
             (node.publisher(CAMERA_INFO).expect("a place"), node.publisher(OBJECT_POSE).expect("a place"));
-        while !told.load(Ordering::Relaxed) {
+        while !stopping.load(Ordering::Relaxed) {
             let stamp_ns = now_ns();
             let state = ArmState { stamp_ns, dof: 7, q: REAL, ..ArmState::default() };
             arm.send(&state).expect("room");

@@ -49,7 +49,7 @@ pub(super) struct Memory {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Spot {
+struct PatchPoint {
     x: f64,
     y: f64,
     /// Least speed of parting [m/s].
@@ -70,7 +70,7 @@ pub(super) struct Patch {
     friction: f64,
     /// Lever of a pad's friction against turns [m].
     lever: f64,
-    spots: [Spot; MOST_PLACES],
+    spots: [PatchPoint; MOST_PLACES],
     count: usize,
     spin: f64,
     columns: [Column; MOST_COLUMNS],
@@ -114,7 +114,7 @@ impl Patch {
         let axes = Matrix3::from_rows(&[first.transpose(), second.transpose(), normal.transpose()]);
         let places = touching.places();
         let origin = Point3::from(places.iter().map(|p| p.at.coords).sum::<Vector3<f64>>() / places.len() as f64);
-        let none = Spot { x: 0.0, y: 0.0, parting: 0.0, slip_mass: 0.0, load: 0.0, tangential: Vector2::zeros() };
+        let none = PatchPoint { x: 0.0, y: 0.0, parting: 0.0, slip_mass: 0.0, load: 0.0, tangential: Vector2::zeros() };
         let mut spots = [none; MOST_PLACES];
         for (spot, place) in spots.iter_mut().zip(places) {
             let from = axes * (place.at - origin);
@@ -129,7 +129,7 @@ impl Patch {
                 .min_by(|a, b| distance(a).total_cmp(&distance(b)))
                 .filter(|known| distance(known) < SAME_PLACE * SAME_PLACE)
                 .map_or((0.0, Vector2::zeros()), |(_, load, tangential)| (*load, (axes * tangential).xy()));
-            *spot = Spot { x: from.x, y: from.y, parting, load: before.0, tangential: before.1, ..none };
+            *spot = PatchPoint { x: from.x, y: from.y, parting, load: before.0, tangential: before.1, ..none };
         }
         let zero = Column { freedom: 0, motion: Vector6::zeros(), answer: Vector6::zeros() };
         Self {
@@ -175,7 +175,7 @@ impl Patch {
         let planar = self.mobility.fixed_view::<3, 3>(0, 0).into_owned();
         let normal = self.mobility.fixed_view::<3, 3>(3, 3).into_owned();
         for i in 0..self.count {
-            let Spot { x, y, .. } = self.spots[i];
+            let PatchPoint { x, y, .. } = self.spots[i];
             let rows = SMatrix::<f64, 2, 3>::new(1.0, 0.0, -y, 0.0, 1.0, x);
             let slips: Matrix2<f64> = rows * planar * rows.transpose();
             let half = 0.5 * slips.trace();
@@ -218,7 +218,7 @@ impl Patch {
     pub(super) fn impulse(&self) -> Vector6<f64> {
         let mut sum = Vector6::zeros();
         sum[2] = self.spin;
-        for Spot { x, y, load, tangential, .. } in &self.spots[..self.count] {
+        for PatchPoint { x, y, load, tangential, .. } in &self.spots[..self.count] {
             sum += Vector6::new(
                 tangential.x,
                 tangential.y,
@@ -303,7 +303,7 @@ impl Patch {
         }
         let weighted = spots.iter().zip(loads).map(|(spot, load)| Vector2::new(spot.x, spot.y) * *load);
         let middle = weighted.sum::<Vector2<f64>>() / total;
-        let from_middle = |spot: &Spot| Vector2::new(spot.x, spot.y) - middle;
+        let from_middle = |spot: &PatchPoint| Vector2::new(spot.x, spot.y) - middle;
         let spread: f64 = spots.iter().zip(loads).map(|(spot, load)| load * from_middle(spot).norm_squared()).sum();
         let pad = total * self.lever * self.lever;
         if spread + pad <= total * LINE * LINE {
@@ -399,7 +399,7 @@ impl Patch {
     fn project_friction(&mut self, motion: &mut Vector6<f64>) {
         for _ in 0..FRICTION_SWEEPS {
             for i in 0..self.count {
-                let Spot { x, y, slip_mass, load, tangential, .. } = self.spots[i];
+                let PatchPoint { x, y, slip_mass, load, tangential, .. } = self.spots[i];
                 let slip = Vector2::new(motion[0] - motion[2] * y, motion[1] + motion[2] * x);
                 let (wanted, limit) = (tangential - slip * slip_mass, self.friction * load);
                 let size = wanted.norm();
@@ -445,6 +445,6 @@ fn stiffened<const N: usize>(mut mobility: SMatrix<f64, N, N>) -> SMatrix<f64, N
 }
 
 /// How parting and the two tilts part a place.
-fn row(spot: &Spot) -> Vector3<f64> {
+fn row(spot: &PatchPoint) -> Vector3<f64> {
     Vector3::new(1.0, spot.y, -spot.x)
 }

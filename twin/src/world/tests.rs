@@ -180,7 +180,7 @@ fn a_held_box_does_not_creep() {
 
 #[test]
 fn a_held_box_slips_where_the_pads_carry_less_than_its_weight() {
-    // Each of the geared fingers presses with half of the drive's force, and rubs on one side of the box.
+    // Each of the geared fingers presses with half of the drive's force, and slides along one side of the box.
     let limit = 0.2 * 9.81 / 0.6;
     for (share, holds) in [(0.98, false), (1.02, true)] {
         let mut world = held_box(limit * share, 0.6);

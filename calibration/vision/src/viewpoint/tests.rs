@@ -183,9 +183,9 @@ fn what_cannot_be_fitted_is_refused_in_one_line() {
         (Options { intrinsics: Some([600.0, 600.0, 320.0, 240.0]), ..options.clone() }, "of this resolution"),
         (Options { method: Method::Swarm(100), ..options }, "silhouettes"),
     ];
-    for (options, told) in refused {
-        let error = run(&options).expect_err(told);
+    for (options, expected) in refused {
+        let error = run(&options).expect_err(expected);
         let line = shared_mem::error_line(error.as_ref());
-        assert!(line.contains(told) && !line.contains('\n'), "{line}");
+        assert!(line.contains(expected) && !line.contains('\n'), "{line}");
     }
 }

@@ -41,7 +41,7 @@ pub enum Reply {
 
 /// Bytes that are no answer to the question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Garbage {
+pub enum InvalidReply {
     /// The check sum does not fit: a bit was lost on the way.
     #[error("a check sum is wrong")]
     Crc,
@@ -89,11 +89,11 @@ impl Request {
     /// The answer that `bytes` begin with; `None` while more of it has to come.
     ///
     /// # Errors
-    /// [`Garbage`] when no further bytes can make them an answer to this question.
-    pub fn answer(&self, station: u8, bytes: &[u8]) -> Result<Option<Reply>, Garbage> {
+    /// [`InvalidReply`] when no further bytes can make them an answer to this question.
+    pub fn answer(&self, station: u8, bytes: &[u8]) -> Result<Option<Reply>, InvalidReply> {
         let &[from, function, ..] = bytes else { return Ok(None) };
         if from != station {
-            return Err(Garbage::Station(from));
+            return Err(InvalidReply::Station(from));
         }
         let asked = match self {
             Self::Read { .. } => READ,
@@ -103,12 +103,12 @@ impl Request {
             (f, _) if f == asked | REFUSAL => 5,
             (READ, Self::Read { count, .. }) => 5 + 2 * usize::from(*count),
             (WRITE, Self::Write { .. }) => 8,
-            _ => return Err(Garbage::Function(function)),
+            _ => return Err(InvalidReply::Function(function)),
         };
         let Some(frame) = bytes.get(..length) else { return Ok(None) };
         let (body, sum) = frame.split_at(length - 2);
         if crc(body).to_le_bytes() != sum {
-            return Err(Garbage::Crc);
+            return Err(InvalidReply::Crc);
         }
         let says = &body[2..];
         match self {
@@ -120,9 +120,9 @@ impl Request {
             Self::Write { address, values } => {
                 let count = values.len().min(MAX_REGISTERS) as u16;
                 let fits = says == [address.to_be_bytes(), count.to_be_bytes()].concat();
-                if fits { Ok(Some(Reply::Written)) } else { Err(Garbage::Size) }
+                if fits { Ok(Some(Reply::Written)) } else { Err(InvalidReply::Size) }
             }
-            Self::Read { .. } => Err(Garbage::Size),
+            Self::Read { .. } => Err(InvalidReply::Size),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The serial port of a Robotiq: one question at a time, a few tries, then a fault.
 
-use super::modbus::{Garbage, Reply, Request};
+use super::modbus::{InvalidReply, Reply, Request};
 use super::orders::Orders;
 use super::registers::{COUNT, INPUT, OUTPUT, Status, fault_in_words};
 use crate::device::{Device, DeviceFault};
@@ -72,7 +72,7 @@ impl Robotiq {
     }
 
     /// The outer error is the port's, the inner one the answer's; `None`: silence.
-    fn try_once(&mut self, request: &Request) -> std::io::Result<Result<Option<Reply>, Garbage>> {
+    fn try_once(&mut self, request: &Request) -> std::io::Result<Result<Option<Reply>, InvalidReply>> {
         // What still lies there belongs to an older question.
         self.port.clear(ClearBuffer::Input)?;
         self.port.write_all(&request.encode(STATION))?;
@@ -81,7 +81,7 @@ impl Robotiq {
             let left = self.patience.saturating_sub(asked.elapsed());
             if left.is_zero() {
                 let cut_off = !bytes.is_empty();
-                return Ok(if cut_off { Err(Garbage::Size) } else { Ok(None) });
+                return Ok(if cut_off { Err(InvalidReply::Size) } else { Ok(None) });
             }
             self.port.set_timeout(left)?;
             match self.port.read(&mut piece) {

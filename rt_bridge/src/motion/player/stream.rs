@@ -2,7 +2,7 @@
 //! ends where it falls silent, is stopped or meets a limit: the arm is braked then and holds.
 
 use super::{Activity, Player};
-use crate::remark::{BrakeReason, Refusal, Remark, Said};
+use crate::remark::{BrakeReason, Newest, Refusal, Remark};
 use crate::safety::{Limits, Trace, Violation};
 use shared_mem::msg::arm::MotionStatus;
 use shared_mem::msg::motion::SetPoint;
@@ -36,9 +36,9 @@ pub(super) struct Stream {
     silent: u32,
     longest_silence: u32,
     /// Whose refusal was said already, of each kind.
-    refused: Said<(u64, Discriminant<Refusal>)>,
+    refused: Newest<(u64, Discriminant<Refusal>)>,
     /// Streams of which a target was passed over since one counted, which was said.
-    passed_over: Said<u64>,
+    passed_over: Newest<u64>,
 }
 
 impl Stream {
@@ -48,8 +48,8 @@ impl Stream {
             follower: Follower::calm(&[0.0; MAX_JOINTS], limits, period_s),
             silent: 0,
             longest_silence: (SILENCE_NS as f64 * 1e-9 / period_s) as u32,
-            refused: Said::default(),
-            passed_over: Said::default(),
+            refused: Newest::default(),
+            passed_over: Newest::default(),
         }
     }
 
@@ -82,11 +82,11 @@ impl Player {
             let is_new = self.stream.passed_over.note(target.stream);
             return is_new.then_some(Remark::PassedOver { motion: target.stream, why });
         }
-        self.stream.passed_over = Said::default();
+        self.stream.passed_over = Newest::default();
         if goes_on {
             return None;
         }
-        (self.motion, self.played, self.stream.refused) = (target.stream, 0, Said::default());
+        (self.motion, self.played, self.stream.refused) = (target.stream, 0, Newest::default());
         (self.activity, self.status) = (Activity::Following, MotionStatus::Playing);
         Some(Remark::Began { motion: target.stream })
     }

@@ -4,7 +4,7 @@ use super::wire::{self, Request, Status};
 use crate::gripper::FRANKA_HAND;
 use crate::gripper::fingers::Fingers;
 use crate::serve::arrivals::{Arrival, Arrivals, Outcome};
-use crate::serve::connection::{Gone, read_into};
+use crate::serve::connection::{ConnectionEnd, read_into};
 use crate::serve::framing::{Inbox, Message};
 use crate::serve::notices::{About, Notices};
 use std::io::Write as _;
@@ -78,7 +78,7 @@ fn serve(mut arrivals: Arrivals, stop: &AtomicBool) {
             };
             match opened {
                 Ok(opened) => client = Some(opened),
-                Err(Gone::Left) => {}
+                Err(ConnectionEnd::Left) => {}
                 Err(gone) => notices.warn(About::Refusal, format_args!("{peer}, of the hand: {gone}")),
             }
         }
@@ -89,15 +89,18 @@ fn serve(mut arrivals: Arrivals, stop: &AtomicBool) {
 
 impl Client {
     /// Answers the first `message` of a connection, which has to be a handshake; `taken` where somebody else is served.
-    fn open(arrival: Arrival, message: &Message, taken: bool) -> Result<Self, Gone> {
+    fn open(arrival: Arrival, message: &Message, taken: bool) -> Result<Self, ConnectionEnd> {
         let Arrival { mut tcp, peer, inbox, .. } = arrival;
         let Some(Request::Connect { version, udp_port }) = wire::request(message.number, &message.payload) else {
-            return Err(Gone::Nonsense("it asks for something before the handshake".into()));
+            return Err(ConnectionEnd::Nonsense("it asks for something before the handshake".into()));
         };
         let refused = if !wire::speaks(version) {
-            Some((wire::version_reply(message.id), Gone::Nonsense(format!("version {version} is none of this hand"))))
+            Some((
+                wire::version_reply(message.id),
+                ConnectionEnd::Nonsense(format!("version {version} is none of this hand")),
+            ))
         } else if taken {
-            Some((wire::busy_reply(message.id), Gone::Second))
+            Some((wire::busy_reply(message.id), ConnectionEnd::Second))
         } else {
             None
         };

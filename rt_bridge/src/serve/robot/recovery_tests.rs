@@ -133,7 +133,7 @@ fn what_a_client_has_set_or_asked_for_ends_with_it() {
     let shown = *robot.state();
     assert_eq!((shown.m_load.get(), shown.NE_T_EE[14].get()), (0.0, 0.0));
     assert!((numbers(shown.q)[1] - numbers(shown.q_d)[1]).abs() < 1e-4, "as stiff as at first, with nothing to lift");
-    // Nor is the next client told of a recovery that it did not ask for.
+    // Nor does the next client see a recovery that it did not ask for.
     robot.body.push_at(0, 10.0);
     idle(&mut robot, 300);
     robot.request(RECOVER, 9, &Request::AutomaticErrorRecovery);

@@ -293,9 +293,9 @@ fn weights(grid: &Grid) -> Weights<f32> {
 }
 
 /// Receives derivatives that nobody needs.
-struct Nowhere;
+struct Discard;
 
-impl Receiver<f32> for Nowhere {
+impl Receiver<f32> for Discard {
     fn distance(&mut self, _: usize, _: f32) {}
 
     fn colour(&mut self, _: usize, _: [f32; 3]) {}
@@ -332,7 +332,7 @@ pub(crate) fn placed(
         for (pixel, jitter) in &rays {
             let (ray, target) = stand.look(pixel);
             let sight = tracer.see(&medium, &ray, *jitter);
-            let (loss, pose) = tracer.learn(&medium, &ray, &sight, (&target, &weights), pivot_steps, &mut Nowhere);
+            let (loss, pose) = tracer.learn(&medium, &ray, &sight, (&target, &weights), pivot_steps, &mut Discard);
             sum += f64::from(loss);
             (0..6).for_each(|i| slope[i] += f64::from(pose[i]));
         }

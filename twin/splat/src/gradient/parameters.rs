@@ -1,7 +1,7 @@
 //! Splats as the columns that are trained, those of a 3DGS PLY: opacity as a logit, sigma as a logarithm.
 
 use crate::cloud::{Splat, SplatCloud};
-use crate::project::Bell;
+use crate::project::Gaussian;
 use crate::real::Real;
 use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 
@@ -111,8 +111,8 @@ impl<T: Real> Parameters<T> {
     }
 
     /// The splat with this number.
-    pub(super) fn bell(&self, number: usize) -> Bell<T> {
-        Bell {
+    pub(super) fn bell(&self, number: usize) -> Gaussian<T> {
+        Gaussian {
             centre: Vector3::from(self.centre[number]),
             turn: self.turn[number],
             sigma: Vector3::from(self.log_sigma[number]).map(|log| log.exp()),

@@ -4,7 +4,7 @@ use super::blend::Sums;
 use super::tiles::{Drawn, normal};
 use super::{COLOR_PLANE, Parameters};
 use crate::harmonics::{slopes, values};
-use crate::project::{Bell, Forward, View, unit};
+use crate::project::{Forward, Gaussian, View, unit};
 use crate::real::Real;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
@@ -108,7 +108,7 @@ fn color_back<T: Real, const C: usize>(
     splats: &Parameters<T>,
     number: usize,
     view: &View<T>,
-    bell: &Bell<T>,
+    bell: &Gaussian<T>,
     drawn: &Drawn<T, C>,
     mut color: [T; 3],
     harmonics: &mut [[T; 3]],

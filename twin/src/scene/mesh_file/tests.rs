@@ -99,9 +99,9 @@ fn a_ply_whose_header_promises_what_is_not_there_is_refused() {
         (file("property float x\n", "18446744073709551615", "1\n"), "18446744073709551615 rows"),
         (file("property list uchar float x\n", "1", "1e18 0\n"), "a list claims"),
     ];
-    for (text, told) in cases {
-        let error = read_as("a.ply", text.as_bytes()).expect_err(told);
-        assert!(error.contains(told), "{error}");
+    for (text, expected) in cases {
+        let error = read_as("a.ply", text.as_bytes()).expect_err(expected);
+        assert!(error.contains(expected), "{error}");
     }
 }
 

@@ -40,7 +40,7 @@ const LOOK_EVERY: u32 = 20;
 pub struct SimScene {
     /// Arm and first object.
     cell: SimCell,
-    others: Vec<Beside>,
+    others: Vec<OtherObject>,
     /// Names of all bodies, and the places of their objects among those of the cell.
     names: Vec<ObjectName>,
     objects: Vec<usize>,
@@ -55,7 +55,7 @@ pub struct SimScene {
 }
 
 /// One of the objects beside the first.
-struct Beside {
+struct OtherObject {
     object: SimObject,
     contact: ToolContact,
 }
@@ -107,7 +107,7 @@ impl SimScene {
             None => {
                 let mut sims = rigid.into_iter().map(|(.., sim)| sim);
                 let mut scene = Self::around(sims.next().ok_or(SimError::NoTable)?, &bodies);
-                let beside = |SimCell { object, contact, .. }: SimCell| Some(Beside { object: object?, contact });
+                let beside = |SimCell { object, contact, .. }: SimCell| Some(OtherObject { object: object?, contact });
                 scene.others = sims.filter_map(beside).collect();
                 scene
             }

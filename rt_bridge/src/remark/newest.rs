@@ -5,18 +5,18 @@ const KEPT: usize = 8;
 
 /// The newest of what was noted.
 #[derive(Debug, Clone, Copy)]
-pub struct Said<T> {
+pub struct Newest<T> {
     newest: [Option<T>; KEPT],
     next: usize,
 }
 
-impl<T> Default for Said<T> {
+impl<T> Default for Newest<T> {
     fn default() -> Self {
         Self { newest: std::array::from_fn(|_| None), next: 0 }
     }
 }
 
-impl<T: PartialEq> Said<T> {
+impl<T: PartialEq> Newest<T> {
     /// Whether this was noted, and not so many others since.
     pub fn has(&self, what: &T) -> bool {
         self.newest.iter().flatten().any(|noted| noted == what)
@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn several_that_come_in_turn_are_new_once_each_and_the_oldest_is_forgotten() {
-        let mut said = Said::default();
+        let mut said = Newest::default();
         for round in 0..3 {
             for id in 0..KEPT {
                 assert_eq!(said.note(id), round == 0, "{id}");
