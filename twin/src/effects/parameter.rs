@@ -37,6 +37,8 @@ pub enum Search {
     /// Not along with the others, since few clips show it well enough to be worth a number of its own: only what was found is
     /// tried at other values of it.
     Held,
+    /// Where a person asks for it (`--also`), and by no diagnosis.
+    OnRequest,
     /// Joint by joint, each with the gains of that joint: it acts as a whole from the smallest size on, no slope leads there, and
     /// gains that were fitted without it stand in for it.
     Threshold,

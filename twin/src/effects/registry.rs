@@ -2,6 +2,7 @@
 //! its candidates from it, the documentation its table.
 
 use super::info::EffectInfo;
+use super::parameter::Search;
 use super::values::EffectError;
 use super::{arm, camera, hit, slide};
 use std::sync::LazyLock;
@@ -34,9 +35,9 @@ fn nearest(name: &str) -> &'static str {
 }
 
 impl EffectInfo {
-    /// Whether it may be what a cell has and its model lacks; else its numbers are identified with the model's own.
+    /// Whether a diagnosis may name it as what a cell has and its model lacks; else its numbers are identified on request alone.
     pub fn is_cause(&self) -> bool {
-        self.name != unknown_weight().name
+        self.parameters.iter().all(|parameter| parameter.search != Search::OnRequest)
     }
 }
 

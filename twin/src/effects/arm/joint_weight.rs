@@ -15,7 +15,7 @@ use super::effect::ArmEffect;
 use crate::arm::{JointState, Joints};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
-use crate::effects::parameter::{Elsewhere, Parameter};
+use crate::effects::parameter::{Elsewhere, Parameter, Search};
 use crate::effects::remedy::Remedy;
 
 /// Searched this far [N m], where no torque limit is known.
@@ -23,14 +23,19 @@ const HELD: [f64; 2] = [-5.0, 5.0];
 /// The same as a share of the torque limit.
 const SHARE_HELD: Elsewhere = Elsewhere::OfTorqueLimit([-0.8, 0.8]);
 
+/// One of three numbers of every joint; no cause, since every arm has weight.
+const fn weight(name: &'static str) -> Parameter {
+    Parameter::size(name, "N m", HELD, 0.0).per_joint().elsewhere(SHARE_HELD).searched(Search::OnRequest)
+}
+
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "joint_weight",
     stage: Stage::Control,
     acts_on: Place::ArmModel,
     parameters: &[
-        Parameter::size("constant", "N m", HELD, 0.0).per_joint().elsewhere(SHARE_HELD),
-        Parameter::size("sine", "N m", HELD, 0.0).per_joint().elsewhere(SHARE_HELD),
-        Parameter::size("cosine", "N m", HELD, 0.0).per_joint().elsewhere(SHARE_HELD),
+        weight("constant"),
+        weight("sine"),
+        weight("cosine"),
     ],
     confusable_with: &["payload", "base_tilt", "joint_friction_asymmetry"],
     separated: &[],
