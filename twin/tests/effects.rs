@@ -6,13 +6,14 @@ use twin::control::{ArmRollout, CommandTrack};
 use twin::effects::{Effects, Elsewhere, Role, Shape, registry};
 
 /// Every name that reports and files may rely on.
-const NAMES: [&str; 39] = [
+const NAMES: [&str; 40] = [
     "joint_coulomb_friction",
     "joint_viscous_friction",
     "joint_stribeck_friction",
     "joint_friction_asymmetry",
     "joint_load_friction",
     "joint_presliding_friction",
+    "joint_position_dependent_friction",
     "command_delay",
     "command_lag",
     "integral_action",

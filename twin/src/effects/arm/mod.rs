@@ -93,6 +93,7 @@ effects_on_the_arm! {
     joint_friction_asymmetry: JointFrictionAsymmetry,
     joint_load_friction: JointLoadFriction,
     joint_presliding_friction: JointPreslidingFriction,
+    joint_position_dependent_friction: JointPositionDependentFriction,
     command_delay: CommandDelay,
     command_lag: CommandLag,
     integral_action: IntegralAction,
