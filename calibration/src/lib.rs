@@ -6,6 +6,7 @@
 //! | module | owns |
 //! |---|---|
 //! | [`acting`] | a policy on a robot, through a running bridge |
+//! | [`answer`] | what verbs answer, as plain types |
 //! | [`check`] | the doctor of a recording: whether the data can mean what they say |
 //! | [`demonstrations`] | recorded episodes of tasks as data to learn from |
 //! | [`demo`] | the whole story on the simulated cell, in one command |
@@ -13,12 +14,14 @@
 //! | [`init`] | a cell.toml to begin with, commented |
 //! | [`identify`] | the parameters that a session tells, and what it cannot tell |
 //! | [`model`] | what was found as a model file of MuJoCo, ROS or Gazebo |
-//! | [`page`] | what all pages are made of: words for numbers, pictures of plain numbers |
+//! | [`page`] | what all pages are made of: pictures of plain numbers |
 //! | [`report`] | pages with plots |
 //! | [`study`] | policies on tasks from the same starts, in several worlds |
 //! | [`sweep`] | work in units, on many cores and machines |
+//! | [`words`] | numbers, units and names as people read them |
 
 pub mod acting;
+pub mod answer;
 pub mod benchmark;
 pub mod check;
 pub mod demo;
@@ -32,3 +35,4 @@ pub mod page;
 pub mod report;
 pub mod study;
 pub mod sweep;
+pub mod words;

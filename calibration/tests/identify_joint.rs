@@ -102,7 +102,7 @@ fn a_hinge_is_found_from_three_pushes_and_written_into_its_urdf() {
         [written.friction, written.damping],
         ["dry_friction", "viscous_friction"].map(|name| found.parameters[name].value[0])
     );
-    let page = found.sheet().page();
+    let page = calibration::report::identification::page(&found);
     assert!(page.contains("push_1") && page.contains("held out in turn"), "a page");
 }
 

@@ -116,7 +116,7 @@ impl Subject {
 }
 
 fn of_identification(found: &Identification, truth: &Theta) -> Vec<Printed> {
-    let of = |(name, parameter): (&String, &crate::identify::answer::Parameter)| {
+    let of = |(name, parameter): (&String, &crate::answer::identification::Parameter)| {
         let values = parameter.value.iter().copied().zip(parameter.ci95.iter().copied());
         printed(name, values, &numbers(truth, name))
     };

@@ -4,7 +4,7 @@ use super::engine::{EngineArguments, heard};
 use super::print;
 use calibration::check::gate::{self, Allowed};
 use calibration::identify::{Identification, Optimizer, arm, joint, object};
-use calibration::report::terminal;
+use calibration::report::{identification, terminal};
 use clap::{Subcommand, ValueEnum};
 use inference::interrupt::Interrupt;
 use shared_mem::output::Destination;
@@ -170,11 +170,10 @@ impl JointArguments {
         gate::unmixed(&provenance, mix)?;
         let mut found = joint::identify(&joint::Options { session, cell, object, joint, out }, interrupt)?;
         found.origin = provenance.to_string();
-        let sheet = found.sheet();
         if let Some(page) = page {
-            page.write(sheet.page())?;
+            page.write(identification::page(&found))?;
         }
-        print(json, &found, terminal::identification(&sheet))
+        print(json, &found, terminal::identification(&found))
     }
 }
 
@@ -232,10 +231,9 @@ impl Task {
         let mut found = identify(self, &session)?;
         gate::add(&mut found.warnings, &looked);
         found.origin = looked.provenance.to_string();
-        let sheet = found.sheet();
         if let Some(page) = page {
-            page.write(sheet.page())?;
+            page.write(identification::page(&found))?;
         }
-        print(json, &found, terminal::identification(&sheet))
+        print(json, &found, terminal::identification(&found))
     }
 }

@@ -7,8 +7,8 @@ mod replay;
 mod stage;
 
 use crate::diagnose::{self, Diagnosis, Verdict, diagnose};
-use crate::page::words;
 use crate::report::{self, Story};
+use crate::words::words;
 use anyhow::{Context as _, bail};
 use capture::excitation::{self, ClipSummary};
 use capture::processes::Program;

@@ -13,13 +13,12 @@
 //! | [`judge`] | how well a hypothesis predicts clips, how much of the gap it closes, how sure that is, and what is left |
 //! | [`propose`] | which candidates are tried, on what, and where their fits begin |
 //! | [`search`] | from the identified baseline to the effects that act together |
-//! | [`conclude`], [`answer`] | the verdict in words and numbers, what to do about it, and what to record next |
+//! | [`conclude`] | the verdict in words and numbers, what to do about it, and what to record next |
 //! | [`against`] | what changed between two sessions of one robot |
 //!
 //! Each needs only those above it.
 
 pub mod against;
-pub mod answer;
 pub mod clips;
 pub mod conclude;
 pub mod criteria;
@@ -36,7 +35,7 @@ mod test_cell;
 #[cfg(test)]
 mod test_likelihood;
 
-pub use answer::{
+pub use crate::answer::diagnosis::{
     Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Remedy, Rest, SensorGap,
     Sensors, Share, StageTest, Status, TorqueRms, Verdict,
 };

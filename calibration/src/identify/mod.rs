@@ -7,18 +7,15 @@
 //! | [`object`] | friction, mass, centre of mass and tip friction of the object |
 //! | [`joint`] | friction and damping of a hinge or a slide of an object that moves in itself |
 //! | [`split`] | which clips are fitted and which are held out |
-//! | [`answer`] | what is found, as JSON, as a page, as lines for a terminal |
-//! | `remarks` | what is odd about clips, told once for all that share it |
+//! | `remarks` | what is odd about clips, said once for all that share it |
 //! | `run` | the way of searching, its progress, its interruption and resumption |
 
-pub mod answer;
 pub mod arm;
 pub mod joint;
 pub mod object;
 pub(crate) mod remarks;
 mod run;
-pub mod sheet;
 pub mod split;
 
-pub use answer::Identification;
+pub use crate::answer::identification::Identification;
 pub use run::Optimizer;

@@ -1,7 +1,7 @@
 //! One search over clips: by least squares or without slopes, with a bar, and so that Ctrl-C loses nothing: every step is kept
 //! ([`Kept`]), and the same command goes on from there to the same answer.
 
-use super::answer::Identification;
+use crate::answer::identification::Identification;
 use inference::estimate::search;
 use inference::estimate::{
     ClipModel, Evolution, Fit, Found, Impossible, Place, Random, Schedule, Search, Swarm, Underway, Unknown, begin,

@@ -1,6 +1,6 @@
 //! Axes: from values to places, and the round numbers to mark.
 
-use super::quantity::power;
+use crate::words::quantity::power;
 
 /// A stretch of values laid along a stretch of the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,15 +48,6 @@ impl Scale {
     }
 }
 
-/// Smallest and largest of the finite values; `[0, 0]` without any.
-pub(crate) fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values
-        .filter(|value| value.is_finite())
-        .map(|value| [value, value])
-        .reduce(|[lo, hi], [value, _]| [lo.min(value), hi.max(value)])
-        .unwrap_or([0.0, 0.0])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,7 +65,5 @@ mod tests {
     fn values_outside_stay_in_the_picture() {
         let scale = Scale::new([0.0, 10.0], [100.0, 200.0]);
         assert_eq!([-5.0, 5.0, 50.0].map(|value| scale.at(value)), [100.0, 150.0, 200.0]);
-        assert_eq!(span([f64::NAN, 2.0, -1.0].into_iter()), [-1.0, 2.0]);
-        assert_eq!(span(std::iter::empty()), [0.0, 0.0]);
     }
 }

@@ -1,25 +1,9 @@
-//! What is left between robot and twin over a clip, before and after: the part of the evidence that eyes can judge.
+//! Pictures of what is left between robot and twin over a clip, before and after: the part of the evidence that eyes can judge.
 
 use super::figure::chart::{Chart, Line};
 use super::frame::legend;
+use crate::answer::Trace;
 use maud::{Markup, html};
-
-/// Measured less predicted of one channel through one clip.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Trace {
-    /// File of the clip.
-    pub clip: String,
-    /// What was measured: `joint2`, `x`, `yaw`.
-    pub channel: String,
-    /// SI unit of the values, or `σ` where they are in units of the noise.
-    pub unit: String,
-    /// One sigma of the noise, in that unit.
-    pub sigma: f64,
-    /// Seconds from the clip's start and the residual, before.
-    pub before: Vec<[f64; 2]>,
-    /// The same after.
-    pub after: Vec<[f64; 2]>,
-}
 
 /// Half the width of the grey band, in sigma: noise alone stays inside 95 % of the time.
 const BAND: f64 = 2.0;

@@ -6,8 +6,8 @@ use crate::diagnose::judge::confidence::MOST;
 use crate::diagnose::{Kind, Status};
 use crate::page::figure::bars::{Row, bars};
 use crate::page::frame::{facts, figure, frame, legend, unbroken};
-use crate::page::share::{limited, percent_interval, probability};
-use crate::page::words;
+use crate::words::share::{limited, percent_interval, probability};
+use crate::words::words;
 use maud::{Markup, html};
 
 pub fn page(found: &Comparison) -> String {

@@ -5,8 +5,8 @@ use crate::page::figure::calibration_curve::{Bin, calibration_curve};
 use crate::page::figure::forest::{Group, Row, forest};
 use crate::page::figure::matrix::confusion;
 use crate::page::frame::{figure, frame, unbroken};
-use crate::page::share::{percent, percent_interval};
-use crate::page::words;
+use crate::words::share::{percent, percent_interval};
+use crate::words::words;
 use maud::{Markup, html};
 
 /// The page. The first method is the one in question, the others stand beside it. `origin`: the command, the time it took.

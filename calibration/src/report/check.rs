@@ -40,7 +40,7 @@ pub fn sentence(found: &Checked) -> String {
 }
 
 fn size(size: &Size) -> String {
-    let number = crate::page::quantity::short;
+    let number = crate::words::quantity::short;
     let [lo, hi] = size.interval;
     let interval = if lo == hi { String::new() } else { format!(" [{}, {}]", number(lo), number(hi)) };
     let unit = if size.unit == "1" { String::new() } else { format!(" {}", size.unit) };

@@ -2,43 +2,45 @@
 
 use super::benchmark::RATES;
 use super::diagnosis::{confidence, has_effects, is_known, sizes, together, verdict_words};
+use super::identification;
+use crate::answer::identification::{Identification, Parameter};
 use crate::benchmark::calibrate::Regenerated;
 use crate::benchmark::score::{Method, Scores};
 use crate::diagnose::against::change;
 use crate::diagnose::against::{Candidate as Compared, Comparison};
 use crate::diagnose::judge::confidence::MOST;
 use crate::diagnose::{Candidate, Diagnosis, Kind, Status, TorqueRms};
-use crate::identify::sheet::{Parameter, Sheet};
-use crate::page::channel_in_words;
-use crate::page::quantity::{Unit, short};
-use crate::page::scale::span;
-use crate::page::share::{limited, percent, percent_interval};
-use crate::page::words;
+use crate::words::channel_in_words;
+use crate::words::parameters::{of_joints, part};
+use crate::words::quantity::span;
+use crate::words::quantity::{Unit, short};
+use crate::words::share::{limited, percent, percent_interval};
+use crate::words::words;
 
 /// Places of the gap that are named.
 const SHOWN_PLACES: usize = 3;
 
 /// An identification: each number with its interval and what was believed, the errors, what is not identifiable, what to do next.
-pub fn identification(sheet: &Sheet) -> String {
-    let mut lines = table(sheet.parameters.iter().flat_map(numbers).collect());
-    lines.extend((!sheet.origin.is_empty()).then(|| format!("origin: {}", sheet.origin)));
-    lines.extend(sheet.errors.iter().map(|error| {
-        let unit = Unit::suited(&error.unit, error.before.unwrap_or(error.after));
-        let before = error.before.map_or_else(String::new, |before| format!("{} -> ", short(unit.scaled(before))));
-        format!("{}: {before}{}", error.name, unit.with_unit(error.after))
+pub fn identification(found: &Identification) -> String {
+    let rows = found.parameters.iter().flat_map(|(name, parameter)| numbers(found, name, parameter));
+    let mut lines = table(rows.collect());
+    lines.extend((!found.origin.is_empty()).then(|| format!("origin: {}", found.origin)));
+    lines.extend(identification::errors(found).iter().map(|error| match error.in_words() {
+        (Some(before), after) => format!("{}: {before} -> {after}", error.name),
+        (None, after) => format!("{}: {after}", error.name),
     }));
-    lines.extend(not_identifiable(&sheet.not_identifiable));
-    lines.extend(sheet.notes.iter().map(|note| format!("note: {note}")));
-    lines.extend(sheet.advice.iter().map(|advice| format!("next: {advice}")));
-    lines.push(sheet.sentence.clone());
+    lines.extend(not_identifiable(found));
+    lines.extend(found.warnings.iter().map(|warning| format!("note: {warning}")));
+    lines.extend(found.advice.iter().map(|advice| format!("next: {}", identification::advice_in_words(advice))));
+    lines.push(identification::sentence(found));
     lines.join("\n")
 }
 
 /// What is not identifiable, a line a reason.
-fn not_identifiable(all: &[[String; 2]]) -> Vec<String> {
-    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
-    for [name, why] in all {
-        match reasons.iter_mut().find(|(known, _)| known == why) {
+fn not_identifiable(found: &Identification) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for (name, why) in identification::open_numbers(found) {
+        match reasons.iter_mut().find(|(known, _)| *known == why) {
             Some((_, names)) => names.push(name),
             None => reasons.push((why, vec![name])),
         }
@@ -178,22 +180,20 @@ fn candidate(candidate: &Candidate) -> Option<(Vec<String>, Vec<String>)> {
 }
 
 /// Rows of a parameter: name, value with interval, what was believed, remark.
-fn numbers(parameter: &Parameter) -> Vec<Vec<String>> {
-    let name = words(&parameter.name);
-    let [lo, hi] = span(parameter.values.iter().copied());
+fn numbers(found: &Identification, name: &str, parameter: &Parameter) -> Vec<Vec<String>> {
+    let [lo, hi] = span(parameter.value.iter().copied());
     let unit = Unit::suited(&parameter.unit, lo.abs().max(hi.abs()));
     let row = |(k, value): (usize, &f64)| {
-        let name = match parameter.part(k) {
-            part if part.is_empty() => name.clone(),
-            part => format!("{name}, {part}"),
+        let shown = match part(of_joints(name), parameter.value.len(), k) {
+            part if part.is_empty() => words(name),
+            part => format!("{}, {part}", words(name)),
         };
-        let interval = parameter.intervals.get(k).copied().unwrap_or([f64::NAN; 2]);
-        let nominal =
-            parameter.nominal.get(k).map_or_else(String::new, |x| format!("began at {}", short(unit.scaled(*x))));
-        let warning = parameter.warnings.get(k).cloned().flatten().unwrap_or_default();
-        vec![name, unit.interval(*value, interval), nominal, warning]
+        let interval = parameter.ci95.get(k).copied().unwrap_or([f64::NAN; 2]);
+        let start = parameter.start.get(k).map_or_else(String::new, |x| format!("began at {}", short(unit.scaled(*x))));
+        let remark = identification::remark(found, name, parameter, k).unwrap_or_default();
+        vec![shown, unit.interval(*value, interval), start, remark.to_owned()]
     };
-    parameter.values.iter().enumerate().map(row).collect()
+    parameter.value.iter().enumerate().map(row).collect()
 }
 
 /// A benchmark: each rate of each method, and the finding.
@@ -238,39 +238,37 @@ fn table(rows: Vec<Vec<String>>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::sheet::Error;
+    use crate::answer::identification::Figures;
+    use crate::answer::identification::{Gap, NotIdentifiable};
+    use std::collections::BTreeMap;
 
     #[test]
     fn columns_stand_under_each_other_and_the_sentence_comes_last() {
         let centre = Parameter {
-            name: "centre_of_mass".into(),
             unit: "m".into(),
-            values: vec![0.0051, -0.002],
-            intervals: vec![[0.0042, 0.006], [-0.003, -0.001]],
-            nominal: vec![0.0, 0.0],
-            warnings: vec![None, Some("at its lower bound".into())],
+            value: vec![0.0051, -0.002],
+            ci95: vec![[0.0042, 0.006], [-0.003, -0.001]],
+            start: vec![0.0, 0.0],
+            single: false,
         };
-        let sheet = Sheet {
-            parameters: vec![centre],
-            errors: vec![Error {
-                name: "ADD, held-out clips".into(),
-                unit: "m".into(),
-                before: Some(0.0139),
-                after: 0.002,
-            }],
-            not_identifiable: ["mass", "load"]
-                .map(|name| [name.into(), "the arm is much heavier; weigh it".into()])
-                .into(),
-            sentence: "The object is known.".into(),
-            ..Sheet::default()
+        let add = |m: f64| Figures { object_add_m: Some(m), ..Figures::default() };
+        let open = |name: &str| NotIdentifiable { parameter: name.into(), why: "weigh it".into() };
+        let found = Identification {
+            parameters: BTreeMap::from([("centre_of_mass".to_owned(), centre)]),
+            gap: Gap { train_before: add(0.0139), train: add(0.002), ..Gap::default() },
+            not_identifiable: vec![open("mass"), open("load")],
+            at_bounds: vec!["centre_of_mass[1]".into()],
+            names: ["centre_of_mass[0]", "centre_of_mass[1]", "mass", "load"].map(str::to_owned).into(),
+            converged: true,
+            ..Identification::default()
         };
         let expected = "\
 centre of mass, x   5.1 [4.2, 6.0] mm      began at 0
-centre of mass, y   -2.0 [-3.0, -1.0] mm   began at 0   at its lower bound
-ADD, held-out clips: 13.9 -> 2.00 mm
-not identifiable: mass; load: the arm is much heavier; weigh it
-The object is known.";
-        assert_eq!(identification(&sheet), expected);
+centre of mass, y   -2.0 [-3.0, -1.0] mm   began at 0   at a bound of its search
+ADD, clips fitted: 13.9 -> 2.00 mm
+not identifiable: mass; load: weigh it
+2 of 4 numbers are identifiable; on the clips it was fitted to the twin is off by 2.00 mm ADD instead of 13.90 mm ADD";
+        assert_eq!(super::identification(&found), expected);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The answer of a comparison of two sessions, as it is written to a file and shown on the page.
 
-use super::super::answer::{Clips, Gap, Kind, Place, Share, Status};
+use crate::answer::diagnosis::{Clips, Gap, Kind, Place, Share, Status};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use shared_mem::recording::SessionFiles;
 use shared_mem::theta::Theta;

@@ -1,10 +1,10 @@
 //! What a number was in one session and is in another, in words.
 
 use super::{Smallest, Values};
-use crate::page::parameters::{of_joints, part};
-use crate::page::quantity::{Unit, short};
-use crate::page::scale::span;
-use crate::page::words;
+use crate::words::parameters::{of_joints, part};
+use crate::words::quantity::span;
+use crate::words::quantity::{Unit, short};
+use crate::words::words;
 
 /// Most numbers that a line names one by one.
 const MOST: usize = 3;

@@ -1,6 +1,5 @@
 //! From what the search found to the answer: the clips kept for confirming are opened here, and only here.
 
-use super::super::answer::{Clips, Kind, Share, Status};
 use super::super::{DiagnoseError, Options};
 use super::answer::{Candidate, Comparison, Smallest, Verdict};
 use super::changes;
@@ -11,6 +10,7 @@ use super::scores::Score;
 use super::search::{Found, Step, Trial, smallest_seen};
 use super::subjects::Subject;
 use super::turned::Side;
+use crate::answer::diagnosis::{Clips, Kind, Share, Status};
 use crate::diagnose::conclude::advice;
 use crate::diagnose::conclude::site::{Advice, Site};
 use crate::diagnose::fit::bench::Hypothesis;

@@ -1,11 +1,11 @@
 //! The finding in one sentence, and the reason for every candidate.
 
-use super::super::answer::{Kind, Place, Share, Status};
 use super::answer::{Candidate, Smallest, Values};
 use super::search::Trial;
+use crate::answer::diagnosis::{Kind, Place, Share, Status};
 use crate::diagnose::against::change::{between, smallest_in_words};
-use crate::page::words;
-use crate::page::{channel_in_words, percent};
+use crate::words::words;
+use crate::words::{channel_in_words, percent};
 
 /// What the sentence is made of.
 pub(super) struct Facts {

@@ -1,10 +1,10 @@
 //! The finding in one sentence of plain words: how large the gap is and where, which effect causes it, how far it shrinks.
 
 use super::verdict::{Decision, Finding};
-use crate::diagnose::answer::{Kind, Share};
+use crate::answer::diagnosis::{Kind, Share};
 use crate::diagnose::judge::gap::Shrunk;
 use crate::diagnose::judge::trial::CLOSES;
-use crate::page::{percent, words};
+use crate::words::{percent, words};
 
 /// What the sentence is made of, beside the finding itself.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -3,8 +3,8 @@
 
 use super::reason::{Judged, reason};
 use super::verdict::Finding;
+use crate::answer::diagnosis::{Candidate, Share, Status};
 use crate::diagnose::Kind;
-use crate::diagnose::answer::{Candidate, Share, Status};
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;

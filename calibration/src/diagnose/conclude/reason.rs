@@ -1,13 +1,13 @@
 //! Why a candidate is the cause or is not, in words: every reason for ruling one out speaks against it.
 
 use super::verdict::Finding;
-use crate::diagnose::answer::{Kind, Status};
+use crate::answer::diagnosis::{Kind, Status};
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::shortlist::{BY_CHANCE, TESTABLE};
 use crate::diagnose::judge::score::Advantage;
 use crate::diagnose::judge::trial::{Found, NEARLY_ALL, PLAIN, Trial, WORTHWHILE, convincing};
-use crate::page::words;
 use inference::likelihood::Evidence;
+use crate::words::words;
 
 /// A candidate with all that its reason is drawn from.
 #[derive(Debug, Clone, Copy)]

@@ -1,6 +1,6 @@
 //! What to do about effects that were named: in the cell, and in a model. Each effect says it itself, from what was identified.
 
-use crate::diagnose::answer::{Kind, Remedy, Verdict};
+use crate::answer::diagnosis::{Kind, Remedy, Verdict};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use twin::effects::find;

@@ -1,6 +1,6 @@
 //! The finding: one of five verdicts, with the effects and how sure it is. [`super::headline`] says it in a sentence.
 
-use crate::diagnose::answer::{Basis, Kind, Verdict};
+use crate::answer::diagnosis::{Basis, Kind, Verdict};
 use crate::diagnose::criteria::{CLASS_IS_RIGHT, NONE_IS_RIGHT, UNKNOWN_IS_RIGHT, UNKNOWN_OF_LITTLE_IS_RIGHT};
 use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::remainder::Left;

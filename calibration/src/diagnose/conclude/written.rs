@@ -1,7 +1,7 @@
 //! The motions that an advice asks for of an arm that no bridge drives, planned within the limits of its cell and written as CSV: a
 //! row a control cycle, time and the commanded position of each joint.
 
-use crate::diagnose::answer::NextMotion;
+use crate::answer::diagnosis::NextMotion;
 use capture::arm_motion::ArmMotion;
 use capture::body::Body;
 use capture::excitation;

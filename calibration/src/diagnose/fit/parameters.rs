@@ -7,12 +7,12 @@
 //! possible.
 
 use super::bench::{Bench, Hypothesis};
-
-use crate::page::{Size, UNBOUNDED};
 use inference::likelihood::Evidence;
 use inference::likelihood::setting::Setting;
 use inference::estimate::interval::Jackknife;
 use inference::statistics::normal;
+use crate::answer::Size;
+use crate::words::UNBOUNDED;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};
 

@@ -1,6 +1,6 @@
 //! The gap: mean square of residuals in sigmas of the sensors, and by how much it shrinks from one hypothesis to another.
 
-use crate::diagnose::answer::Share;
+use crate::answer::diagnosis::Share;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use inference::likelihood::{Evidence, Group};
 use rand::{RngExt, SeedableRng};

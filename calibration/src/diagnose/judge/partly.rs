@@ -13,7 +13,7 @@ use super::gap::Residuals;
 use super::held_out::{self, Fits};
 use super::trial::{Found, Step};
 use super::{confidence, remainder};
-use crate::diagnose::answer::Share;
+use crate::answer::diagnosis::Share;
 use crate::diagnose::clips::split::Split;
 use crate::diagnose::fit::bench::Bench;
 use inference::likelihood::Evidence;

@@ -1,11 +1,11 @@
 //! Whose the object's gap is: the object is simulated once more under the arm that was recorded, moved along its measured motion. What
 //! is gone then was the arm's; only what stays belongs to the hit, the slide and the camera.
 
+use crate::answer::diagnosis::StageTest;
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::answer::StageTest;
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::clips::torques;
-use crate::page::in_unit;
+use crate::words::in_unit;
 use shared_mem::cell::Cell;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;

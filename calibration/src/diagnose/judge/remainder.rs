@@ -5,7 +5,7 @@
 
 use super::ends;
 use super::gap::Typical;
-use crate::diagnose::answer::{SensorGap, Sensors};
+use crate::answer::diagnosis::{SensorGap, Sensors};
 use crate::diagnose::criteria::{
     DOUBTFUL, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, OBJECT_EXCESS,
     OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, PLAIN_IN_JOINTS, PLAIN_IN_OBJECT, TURNS_WITHIN,

@@ -4,14 +4,13 @@ use super::gap::Residuals;
 use super::held_out::Fits;
 use super::remainder;
 use super::tolerance::{self, Measured};
+use crate::answer::diagnosis::{Change, Gap, SensorGap, TorqueRms};
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::answer::{Change, Gap, SensorGap, TorqueRms};
 use crate::diagnose::clips::admit::Admitted;
 use crate::diagnose::fit::bench::Bench;
-use crate::page::in_unit;
-use inference::likelihood::Evidence;
+use inference::likelihood::{Evidence, setting};
 use inference::likelihood::object::Replays;
-use inference::likelihood::setting;
+use crate::words::in_unit;
 use shared_mem::cell::Tolerance;
 use shared_mem::recording::Session;
 

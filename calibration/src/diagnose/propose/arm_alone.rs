@@ -9,7 +9,7 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
 use crate::diagnose::fit::{stages, undetermined};
 use crate::diagnose::judge::trial::Step;
-use crate::page::words;
+use crate::words::words;
 use inference::estimate::{ClipModel, Impossible};
 use inference::likelihood::arm::following::Moment;
 use inference::likelihood::random_effects::{RandomEffects, WithoutOwn};

@@ -3,7 +3,7 @@
 
 use super::finding::Finding;
 use super::session::Used;
-use crate::identify::answer::Advice;
+use crate::answer::identification::Advice;
 
 /// So many proposals.
 const PROPOSALS: usize = 3;

@@ -4,7 +4,7 @@
 use super::Model;
 use super::finding::Finding;
 use super::session::Used;
-use crate::identify::answer::{Figures, Identification};
+use crate::answer::identification::{Figures, Identification};
 use inference::estimate::{ClipFit, Fit};
 use inference::likelihood::Setting;
 use nalgebra::DMatrix;

@@ -2,13 +2,10 @@
 
 use super::session::Used;
 use super::{ArmError, Model};
-use crate::identify::answer::{ClipGap, Figures, Gap, Identification};
+use crate::answer::Trace;
+use crate::answer::identification::{ClipGap, Figures, Gap, Identification};
 use crate::identify::run::RunError;
-use crate::page::Trace;
-use inference::estimate::Random;
-use inference::estimate::Subset;
-use inference::estimate::score;
-use inference::estimate::Schedule;
+use inference::estimate::{Random, Schedule, Subset, score};
 use rayon::prelude::*;
 
 /// Points of a picture's line.

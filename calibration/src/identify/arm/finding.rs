@@ -1,6 +1,6 @@
 //! What a fit tells about the arm, number by number: values, intervals, correlations.
 
-use crate::identify::answer::{Identification, Parameter};
+use crate::answer::identification::{Identification, Parameter};
 use crate::identify::run::Outcome;
 use inference::estimate::interval::LEVEL;
 use inference::estimate::{Intervals, Unknown, at_bounds};

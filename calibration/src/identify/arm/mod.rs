@@ -26,8 +26,8 @@ mod start;
 mod time_step;
 mod verdict;
 
-use super::answer::Identification;
 use super::run::{Optimizer, Outcome, Run, RunError, concluded};
+use crate::answer::identification::Identification;
 use finding::Finding;
 use inference::engine::{Engine, Used};
 use inference::estimate::{ClipModel as _, Random, Subset, Unknown};

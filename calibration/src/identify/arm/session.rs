@@ -1,7 +1,7 @@
 //! Which clips of a session can be used for the arm, and for what. What cannot be used is left out and told.
 
 use super::{ArmError, Model};
-use crate::identify::answer::{self, Clips, Identification};
+use crate::answer::identification::{self, Clips, Identification};
 use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
 use inference::estimate::{ClipModel as _, Unknown};
@@ -16,7 +16,7 @@ use std::path::Path;
 pub(super) struct Material {
     pub(super) cell: Cell,
     pub(super) clips: Vec<Clip>,
-    pub(super) left_out: Vec<answer::LeftOut>,
+    pub(super) left_out: Vec<identification::LeftOut>,
 }
 
 /// Which clips are used for what.
@@ -24,7 +24,7 @@ pub(super) struct Used {
     pub(super) split: Split,
     train: Vec<String>,
     holdout: Vec<String>,
-    left_out: Vec<answer::LeftOut>,
+    left_out: Vec<identification::LeftOut>,
     warnings: Vec<String>,
 }
 
@@ -36,7 +36,9 @@ pub(super) fn open(path: &Path, cell: Option<&Path>) -> Result<Material, ReadErr
     for (file, clip) in read {
         match clip {
             Ok(clip) => clips.push(clip),
-            Err(error) => left_out.push(answer::LeftOut { file: file.display().to_string(), why: error.to_string() }),
+            Err(error) => {
+                left_out.push(identification::LeftOut { file: file.display().to_string(), why: error.to_string() })
+            }
         }
     }
     Ok(Material { cell: session.cell, clips, left_out })
@@ -45,11 +47,13 @@ pub(super) fn open(path: &Path, cell: Option<&Path>) -> Result<Material, ReadErr
 pub(super) fn used(
     path: &Path,
     model: &Model<'_>,
-    mut left_out: Vec<answer::LeftOut>,
+    mut left_out: Vec<identification::LeftOut>,
     unusable: Vec<LeftOut>,
     seed: u64,
 ) -> Result<Used, ArmError> {
-    left_out.extend(unusable.into_iter().map(|clip| answer::LeftOut { file: clip.file, why: clip.why.to_string() }));
+    left_out.extend(
+        unusable.into_iter().map(|clip| identification::LeftOut { file: clip.file, why: clip.why.to_string() }),
+    );
     if model.clips() == 0 {
         let reasons = reasons(&left_out);
         let why = if reasons.is_empty() { "it lists none with an arm".into() } else { reasons };
@@ -75,7 +79,7 @@ pub(super) fn used(
 }
 
 /// Why clips were left out, in one line.
-fn reasons(left_out: &[answer::LeftOut]) -> String {
+fn reasons(left_out: &[identification::LeftOut]) -> String {
     grouped(left_out.iter().map(|clip| (clip.file.as_str(), clip.why.as_str()))).join("; ")
 }
 

@@ -3,10 +3,10 @@
 use super::Model;
 use super::finding::Finding;
 use super::session::{Used, joint_of};
-use crate::identify::answer::Untold;
+use crate::answer::identification::NotIdentifiable;
 use crate::identify::run::Optimizer;
-use crate::page::number_in_words;
 use inference::likelihood::Setting;
+use crate::words::number_in_words;
 use twin::effects::{Robot, find};
 
 /// A gain whose 95 % interval is wider than this share of it, to either side, is not told.
@@ -22,13 +22,18 @@ const LOST: &str = "the search ended before it arrived: gains alone do not expla
 /// An effect this near to neutral is absent, as a share of its search.
 const ABSENT: f64 = 1e-9;
 
-pub(super) fn untold(finding: &Finding<'_>, model: &Model<'_>, clips: &Used, optimizer: Optimizer) -> Vec<Untold> {
+pub(super) fn untold(
+    finding: &Finding<'_>,
+    model: &Model<'_>,
+    clips: &Used,
+    optimizer: Optimizer,
+) -> Vec<NotIdentifiable> {
     // A swarm ends with its budget; least squares that do not arrive have lost their way.
     let lost = !finding.outcome.arrived && optimizer == Optimizer::LeastSquares;
     let all = 0..finding.unknowns.len();
     all.filter_map(|k| {
         let why = why(finding, k, model, clips).or_else(|| lost.then(|| LOST.to_owned()))?;
-        Some(Untold { parameter: finding.unknowns[k].name.clone(), why })
+        Some(NotIdentifiable { parameter: finding.unknowns[k].name.clone(), why })
     })
     .collect()
 }

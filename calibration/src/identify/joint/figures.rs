@@ -3,9 +3,9 @@
 use super::fit::Found;
 use super::model::Motion;
 use super::{Looked, Material};
-use crate::identify::answer::{ClipGap, Clips, Figures, Gap, Identification, Parameter, Untold};
+use crate::answer::Trace;
+use crate::answer::identification::{ClipGap, Clips, Figures, Gap, Identification, NotIdentifiable, Parameter};
 use crate::identify::remarks::grouped;
-use crate::page::Trace;
 use inference::estimate::ClipFit;
 use std::collections::BTreeMap;
 
@@ -105,8 +105,9 @@ fn parameters(material: &Material, found: &Found) -> BTreeMap<String, Parameter>
     [(friction, joint.friction), (damping, joint.damping)].into_iter().enumerate().map(parameter).collect()
 }
 
-fn not_identifiable(found: &Found) -> Vec<Untold> {
-    let untold = |k: usize| Some(Untold { parameter: found.unknowns[k].name.clone(), why: found.open(k)?.into() });
+fn not_identifiable(found: &Found) -> Vec<NotIdentifiable> {
+    let untold =
+        |k: usize| Some(NotIdentifiable { parameter: found.unknowns[k].name.clone(), why: found.open(k)?.into() });
     (0..found.unknowns.len()).filter_map(untold).collect()
 }
 

@@ -28,8 +28,8 @@ mod subject;
 mod tests;
 mod together;
 
-use super::answer::{Identification, LeftOut};
 use super::remarks::grouped;
+use crate::answer::identification::{Identification, LeftOut};
 use alone::Alone;
 use fit::{Found, held_out, scored};
 use inference::interrupt::Interrupt;

@@ -9,7 +9,7 @@ use super::material::Material;
 use super::paper::SurfaceLoss;
 use super::polish::{fit_polished, fit_poses_alone};
 use super::{ObjectError, Options, Problem};
-use crate::identify::answer::Figures;
+use crate::answer::identification::Figures;
 use crate::identify::run::{Optimizer, Run, stopped};
 use inference::estimate::{ClipModel as _, Unknown};
 use inference::interrupt::Interrupt;

@@ -1,7 +1,7 @@
 //! What speaks against trusting a fit although it looks sure of itself, one sentence each with the remedy.
 
-use crate::identify::answer::{ClipGap, Identification};
 use inference::likelihood::object::noise_of;
+use crate::answer::identification::{ClipGap, Identification};
 use shared_mem::cell::Cell;
 
 /// ADD on the clips fitted, over the tracker's noise, from which on it is neither noise nor chance in the hits.
@@ -48,7 +48,7 @@ pub(super) fn doubts(answer: &Identification, cell: &Cell) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::answer::Figures;
+    use crate::answer::identification::Figures;
     use shared_mem::cell::Robot;
 
     fn told(fitted: [f64; 5], cell: &Cell) -> Vec<String> {

@@ -2,8 +2,8 @@
 
 use super::ObjectError;
 use super::material::Material;
-use crate::identify::answer::{ClipGap, Figures, Identification};
-use crate::page::Trace;
+use crate::answer::Trace;
+use crate::answer::identification::{ClipGap, Figures, Identification};
 use inference::engine::Engine;
 use inference::likelihood::object::Replays;
 use rayon::prelude::*;

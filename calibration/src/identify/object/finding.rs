@@ -2,8 +2,8 @@
 
 use super::fit::ObjectFit;
 use super::material::Material;
-use crate::identify::answer::{Advice, Identification, Parameter, Untold};
-use crate::page::number_in_words;
+use crate::answer::identification::{Advice, Identification, NotIdentifiable, Parameter};
+use crate::words::number_in_words;
 use inference::estimate::{Fit, Intervals, Unknown};
 use inference::likelihood::{Setting, Settings};
 use std::collections::BTreeMap;
@@ -90,8 +90,9 @@ impl<'a> Finding<'a> {
         parameters
     }
 
-    fn untold(&self, material: &Material) -> Vec<Untold> {
-        let untold = |k: usize| Some(Untold { parameter: self.unknowns[k].name.clone(), why: self.why(k, material)? });
+    fn untold(&self, material: &Material) -> Vec<NotIdentifiable> {
+        let untold =
+            |k: usize| Some(NotIdentifiable { parameter: self.unknowns[k].name.clone(), why: self.why(k, material)? });
         (0..self.unknowns.len()).filter_map(untold).collect()
     }
 

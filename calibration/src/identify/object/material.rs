@@ -2,7 +2,7 @@
 
 use super::screen::{Screened, screened};
 use super::{ObjectError, Options};
-use crate::identify::answer::{Clips, LeftOut};
+use crate::answer::identification::{Clips, LeftOut};
 use crate::identify::remarks::grouped;
 use crate::identify::split::{Split, split};
 use inference::likelihood::arm::one_piece;

@@ -36,8 +36,8 @@ mod step;
 mod test_clip;
 mod vicinity;
 
-use super::answer::Identification;
 use super::run::{Optimizer, Outcome, Run, RunError, concluded};
+use crate::answer::identification::Identification;
 use finding::Finding;
 use fit::{ObjectFit, fit_object, linearise_object};
 use inference::engine::{Engine, EngineError, Used};

@@ -1,8 +1,9 @@
 //! Before and after, as pairs of bars; a dashed line where noise alone would end.
 
 use crate::page::canvas::{Anchor, Canvas, WIDTH, width_of};
-use crate::page::quantity::Unit;
-use crate::page::scale::{Scale, span};
+use crate::page::scale::Scale;
+use crate::words::quantity::Unit;
+use crate::words::quantity::span;
 use maud::Markup;
 use std::collections::BTreeMap;
 

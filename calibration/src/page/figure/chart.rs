@@ -1,8 +1,9 @@
 //! Lines over an axis: residuals with the noise as a band, paths, convergence.
 
 use crate::page::canvas::{Anchor, Canvas};
-use crate::page::quantity::Unit;
-use crate::page::scale::{Scale, span};
+use crate::page::scale::Scale;
+use crate::words::quantity::Unit;
+use crate::words::quantity::span;
 use maud::Markup;
 
 /// Most points of a line: more than a screen shows only makes the page heavy.

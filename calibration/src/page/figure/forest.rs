@@ -1,8 +1,9 @@
 //! Parameters with their intervals, each on its own scale from bound to bound or around what was believed before.
 
 use crate::page::canvas::{Anchor, Canvas, WIDTH, width_of};
-use crate::page::quantity::{Unit, short};
-use crate::page::scale::{Scale, span};
+use crate::page::scale::Scale;
+use crate::words::quantity::span;
+use crate::words::quantity::{Unit, short};
 use maud::Markup;
 
 /// Parameters of one kind, which share an axis.

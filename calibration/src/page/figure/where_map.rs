@@ -1,7 +1,7 @@
 //! Where the gap lies: one grid a stage, regimes down, channels across, the share of the squared residual in each cell.
 
 use crate::page::canvas::{Anchor, Canvas, WIDTH};
-use crate::page::share::percent;
+use crate::words::share::percent;
 use maud::Markup;
 use std::cmp::Ordering;
 

@@ -1,13 +1,14 @@
 //! The candidates: those in question as a table, those ruled out folded away, those that could not have been seen by name.
 
+use crate::answer::Size;
+use crate::answer::numbers;
 use crate::diagnose::judge::confidence::MOST;
 use crate::diagnose::{Candidate, Status};
-use crate::page::Size;
 use crate::page::canvas::Canvas;
 use crate::page::figure::forest::{Group, forest};
-use crate::page::parameters::{Numbers, numbers};
-use crate::page::share::{limited, percent_interval, probability};
-use crate::page::words;
+use crate::words::parameters::Numbers;
+use crate::words::share::{limited, percent_interval, probability};
+use crate::words::words;
 use maud::{Markup, html};
 
 /// Width of a probability's bar.

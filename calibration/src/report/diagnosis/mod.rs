@@ -9,9 +9,9 @@ pub(super) use gap::is_known;
 use crate::diagnose::{Basis, Diagnosis, Kind, Verdict};
 use crate::page::figure::where_map::{Cell, where_map};
 use crate::page::frame::{facts, figure, frame, unbroken};
-use crate::page::share::{percent_interval, probability};
 use crate::page::trace::gallery;
-use crate::page::words;
+use crate::words::share::{percent_interval, probability};
+use crate::words::words;
 use maud::{Markup, html};
 
 /// Clips whose residuals are shown.
@@ -177,9 +177,9 @@ fn clip_list(clips: &[String]) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::answer::Size;
+    use crate::answer::Trace;
     use crate::diagnose::{Candidate, Change, Clips, Gap, Nearest, Place, Remedy, Share, Status, Verdict};
-    use crate::page::Size;
-    use crate::page::Trace;
     use shared_mem::recording::SessionFiles;
     use shared_mem::theta::Theta;
     use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! The answer of a diagnosis, as it is written to diagnosis.json and shown on the page.
 
-use crate::page::{Size, Trace};
+use super::{Size, Trace};
 use capture::arm_motion::ArmMotion;
 use capture::rate::RATE;
 use inference::engine::Used;
@@ -185,7 +185,7 @@ pub struct Gap {
     pub after: f64,
     /// What noise and scatter alone leave.
     pub floor: f64,
-    /// [`crate::diagnose::judge::gap::Residuals::shrink`]: `1 - after / before`, at least -1: a gap that more than doubles.
+    /// `1 - after / before`, at least -1: a gap that more than doubles.
     pub shrink: Share,
     /// `(before - after) / (before - floor)`.
     pub explainable_fraction: f64,
@@ -354,15 +354,6 @@ pub struct Remedy {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn one_number_stands_by_itself_and_several_as_lists() {
-        let text = |size: &Size| serde_json::to_string(size).expect("JSON");
-        let delay = Size { values: vec![0.012], ci90: vec![[0.011, 0.013]], unit: "s".into() };
-        assert_eq!(text(&delay), r#"{"value":0.012,"ci90":[0.011,0.013],"unit":"s"}"#);
-        let offset = Size { values: vec![1.0, 2.0], ci90: vec![[0.0, 2.0], [1.0, 3.0]], unit: "m".into() };
-        assert_eq!(text(&offset), r#"{"value":[1.0,2.0],"ci90":[[0.0,2.0],[1.0,3.0]],"unit":"m"}"#);
-    }
 
     #[test]
     fn verdicts_are_written_as_others_read_them() {

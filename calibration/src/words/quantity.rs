@@ -117,6 +117,15 @@ fn times_ten_to(exponent: i32) -> String {
     format!("\u{b7}10{raised}")
 }
 
+/// Smallest and largest of the finite values; `[0, 0]` without any.
+pub(crate) fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values
+        .filter(|value| value.is_finite())
+        .map(|value| [value, value])
+        .reduce(|[lo, hi], [value, _]| [lo.min(value), hi.max(value)])
+        .unwrap_or([0.0, 0.0])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,5 +163,11 @@ mod tests {
         assert_eq!(short(f64::NAN), "-");
         assert_eq!(short(1.2e-7), "1.2\u{b7}10\u{207b}\u{2077}");
         assert_eq!(short(123.4), "123");
+    }
+
+    #[test]
+    fn what_is_no_number_has_no_part_in_a_span() {
+        assert_eq!(span([f64::NAN, 2.0, -1.0].into_iter()), [-1.0, 2.0]);
+        assert_eq!(span(std::iter::empty()), [0.0, 0.0]);
     }
 }

@@ -1,7 +1,6 @@
-//! What an identification found: one structure for the JSON answer, the page and the terminal. SI units.
+//! What an identification found. SI units.
 
-use super::sheet::{Clip as SheetClip, Error as SheetError, Parameter as SheetParameter, Sheet};
-use crate::page::{Trace, number_in_words};
+use super::Trace;
 use inference::engine::Used;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
@@ -30,7 +29,7 @@ pub struct Identification {
     /// What was found, by name.
     pub parameters: BTreeMap<String, Parameter>,
     /// What is not identifiable from the clips.
-    pub not_identifiable: Vec<Untold>,
+    pub not_identifiable: Vec<NotIdentifiable>,
     /// How far the twin is off.
     pub gap: Gap,
     /// Which clips were used for what.
@@ -103,7 +102,7 @@ impl Serialize for Parameter {
 
 /// A number that is not identifiable from the clips.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub struct Untold {
+pub struct NotIdentifiable {
     pub parameter: String,
     /// The reason, and what would help.
     pub why: String,
@@ -198,123 +197,5 @@ impl Figures {
             object_add_m: of(|f| f.object_add_m, 1),
             object_add_s_m: of(|f| f.object_add_s_m, 1),
         }
-    }
-}
-
-impl Identification {
-    /// The same for page and terminal.
-    pub fn sheet(&self) -> Sheet {
-        let parameters = self.parameters.iter().map(|(name, parameter)| self.sheet_parameter(name, parameter));
-        let sets = [
-            ("clips fitted", &self.gap.train_before, &self.gap.train),
-            ("clips held out", &self.gap.holdout_before, &self.gap.holdout),
-        ];
-        let mut errors = Vec::new();
-        for (set, before, after) in sets.into_iter().rev() {
-            let mut push = |what: &str, unit: &str, before: Option<f64>, after: Option<f64>| {
-                if let Some(after) = after {
-                    errors.push(SheetError { name: format!("{what}, {set}"), unit: unit.into(), before, after });
-                }
-            };
-            push("ADD", "m", before.object_add_m, after.object_add_m);
-            push("ADD-S", "m", before.object_add_s_m, after.object_add_s_m);
-            push("joint error (RMS)", "rad", before.joint_rms_rad, after.joint_rms_rad);
-            push("joint error (RMS)", "m", before.joint_rms_m, after.joint_rms_m);
-        }
-        let clip = |clip: &ClipGap| SheetClip {
-            file: clip.file.clone(),
-            used: clip.used.clone(),
-            error: [clip.before, clip.after].map(|f| f.object_add_m.or(f.joint_rms_rad).or(f.joint_rms_m)),
-            remark: clip.warnings.join("; "),
-        };
-        let left_out = |clip: &LeftOut| SheetClip {
-            file: clip.file.clone(),
-            used: "left out".into(),
-            error: [None; 2],
-            remark: clip.why.clone(),
-        };
-        Sheet {
-            target: self.target.clone(),
-            session: self.session.clone(),
-            origin: self.origin.clone(),
-            files: self.files.clone(),
-            sentence: self.sentence(),
-            parameters: parameters.collect(),
-            not_identifiable: self
-                .not_identifiable
-                .iter()
-                .map(|u| [number_in_words(&u.parameter), u.why.clone()])
-                .collect(),
-            errors,
-            clips: self.by_clip.iter().map(clip).chain(self.clips.left_out.iter().map(left_out)).collect(),
-            clip_error: match self.gap.train {
-                Figures { object_add_m: Some(_), .. } => ["ADD", "m"],
-                Figures { joint_rms_m: Some(_), .. } => ["joint error (RMS)", "m"],
-                _ => ["joint error (RMS)", "rad"],
-            },
-            traces: self.traces.clone(),
-            convergence: self.convergence.clone(),
-            names: self.names.iter().map(|name| number_in_words(name)).collect(),
-            correlation: self.correlation.clone(),
-            advice: self.advice.iter().map(Advice::sentence).collect(),
-            notes: self.warnings.clone(),
-            provenance: vec![
-                ["origin".into(), self.origin.clone()],
-                ["way of searching".into(), self.optimizer.clone()],
-                ["clips simulated".into(), self.evaluations.to_string()],
-                ["wall time".into(), format!("{:.1} s", self.seconds)],
-            ],
-            theta_file: self.theta_file.clone(),
-        }
-    }
-
-    /// The finding in one sentence.
-    pub fn sentence(&self) -> String {
-        let known = self.names.len() - self.not_identifiable.len().min(self.names.len());
-        let figure = |f: &Figures| {
-            f.object_add_m
-                .map(|m| format!("{:.2} mm ADD", m * 1e3))
-                .or_else(|| f.joint_rms_rad.map(|rad| format!("{:.3} mrad", rad * 1e3)))
-                .or_else(|| f.joint_rms_m.map(|m| format!("{:.3} mm", m * 1e3)))
-        };
-        let (set, before, after) = if self.clips.holdout.is_empty() {
-            ("the clips it was fitted to", &self.gap.train_before, &self.gap.train)
-        } else {
-            ("held-out clips", &self.gap.holdout_before, &self.gap.holdout)
-        };
-        let end = if self.converged { "" } else { "; the search did not arrive at an end" };
-        match (figure(before), figure(after)) {
-            (Some(before), Some(after)) => format!(
-                "{known} of {} numbers are identifiable; on {set} the twin is off by {after} instead of {before}{end}",
-                self.names.len()
-            ),
-            _ => format!("{known} of {} numbers are identifiable{end}", self.names.len()),
-        }
-    }
-
-    fn sheet_parameter(&self, name: &str, parameter: &Parameter) -> SheetParameter {
-        let part = |k: usize| if parameter.value.len() > 1 { format!("{name}[{k}]") } else { name.to_owned() };
-        let warning = |k: usize| {
-            let part = part(k);
-            if self.at_bounds.contains(&part) {
-                return Some("at a bound of its search".to_owned());
-            }
-            self.not_identifiable.iter().any(|u| u.parameter == part).then(|| "not identifiable".to_owned())
-        };
-        SheetParameter {
-            name: name.into(),
-            unit: parameter.unit.clone(),
-            values: parameter.value.clone(),
-            intervals: parameter.ci95.clone(),
-            nominal: parameter.start.clone(),
-            warnings: (0..parameter.value.len()).map(warning).collect(),
-        }
-    }
-}
-
-impl Advice {
-    fn sentence(&self) -> String {
-        let share = 100.0 * (1.0 - self.predicted / self.now);
-        format!("{} narrows the interval of {} by {share:.0} %", self.record, number_in_words(&self.parameter))
     }
 }

@@ -1,0 +1,17 @@
+//! What verbs answer, as plain types in SI units: made by `identify` and `diagnose`, only read by pages, terminals and files.
+//!
+//! | module | owns |
+//! |---|---|
+//! | [`identification`] | parameters that clips tell, and what they cannot tell |
+//! | [`diagnosis`] | where a gap lies, what causes it, what to do about it |
+//! | `size` | a parameter of an effect with its interval |
+//! | `trace` | what is left between robot and twin over a clip |
+
+pub mod diagnosis;
+pub mod identification;
+mod size;
+mod trace;
+
+pub(crate) use size::numbers;
+pub use size::{Size, effect_in_words};
+pub use trace::Trace;

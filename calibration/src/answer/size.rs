@@ -1,0 +1,77 @@
+//! A parameter of an effect with its interval, in SI units.
+
+use crate::words::parameters::{Numbers, of_joints};
+use crate::words::words;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+use std::collections::BTreeMap;
+
+/// One number, or one a joint or axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Size {
+    pub values: Vec<f64>,
+    /// A 90 % interval each.
+    pub ci90: Vec<[f64; 2]>,
+    /// SI unit; `1` without.
+    pub unit: String,
+}
+
+impl Size {
+    /// Whether the `k`-th number was fitted; else it was held at its default, and its interval has no width.
+    pub fn is_fitted(&self, k: usize) -> bool {
+        self.ci90.get(k).is_none_or(|[low, high]| high > low)
+    }
+}
+
+impl Serialize for Size {
+    /// `{"value", "ci90", "unit"}`: a single number stands by itself, several as lists.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut out = serializer.serialize_struct("Size", 3)?;
+        if let ([value], [interval]) = (&self.values[..], &self.ci90[..]) {
+            out.serialize_field("value", value)?;
+            out.serialize_field("ci90", interval)?;
+        } else {
+            out.serialize_field("value", &self.values)?;
+            out.serialize_field("ci90", &self.ci90)?;
+        }
+        out.serialize_field("unit", &self.unit)?;
+        out.end()
+    }
+}
+
+/// An effect with what was fitted of it: `command delay (delay 11.9 ms)`; what was held at its default is left out.
+pub fn effect_in_words(effect: &str, parameters: &BTreeMap<String, Size>) -> String {
+    let fitted = parameters.iter().filter(|(_, size)| (0..size.values.len()).any(|k| size.is_fitted(k)));
+    let sizes: Vec<String> = fitted.map(|(name, size)| numbers(effect, name, size).brief()).collect();
+    let name = words(effect);
+    if sizes.is_empty() { name } else { format!("{name} ({})", sizes.join("; ")) }
+}
+
+/// A parameter of an effect.
+pub(crate) fn numbers<'a>(effect: &str, name: &'a str, size: &'a Size) -> Numbers<'a> {
+    let joints = of_joints(&format!("{effect}.{name}"));
+    Numbers { name, joints, unit: &size.unit, values: &size.values, intervals: &size.ci90 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_number_stands_by_itself_and_several_as_lists() {
+        let text = |size: &Size| serde_json::to_string(size).expect("JSON");
+        let delay = Size { values: vec![0.012], ci90: vec![[0.011, 0.013]], unit: "s".into() };
+        assert_eq!(text(&delay), r#"{"value":0.012,"ci90":[0.011,0.013],"unit":"s"}"#);
+        let offset = Size { values: vec![1.0, 2.0], ci90: vec![[0.0, 2.0], [1.0, 3.0]], unit: "m".into() };
+        assert_eq!(text(&offset), r#"{"value":[1.0,2.0],"ci90":[[0.0,2.0],[1.0,3.0]],"unit":"m"}"#);
+    }
+
+    #[test]
+    fn an_effect_is_named_with_what_was_fitted_of_it_and_not_with_its_defaults() {
+        let size = |values: Vec<f64>, ci90| Size { values, ci90, unit: "N m".into() };
+        let coulomb = size(vec![0.3, 0.4], vec![[0.2, 0.4], [0.3, 0.5]]);
+        let creep = size(vec![0.002, 0.002], vec![[0.002; 2]; 2]);
+        let parameters = BTreeMap::from([("coulomb".to_owned(), coulomb), ("creep".to_owned(), creep)]);
+        let words = effect_in_words("joint_coulomb_friction", &parameters);
+        assert_eq!(words, "joint coulomb friction (coulomb 0.300 N m, 0.400 N m)");
+    }
+}
