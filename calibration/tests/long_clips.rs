@@ -2,9 +2,9 @@
 
 use calibration::benchmark::session::record;
 use calibration::benchmark::world::{Fault, Kind as Motion, World};
-use calibration::diagnose::clips::admit::Admitted;
-use calibration::diagnose::clips::length::liveliest;
 use calibration::diagnose::{Kind, Options, diagnose_clips};
+use inference::admit::Admitted;
+use inference::admit::length::liveliest;
 use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::recording::{Clip, JointSeries, Session, SessionFiles};

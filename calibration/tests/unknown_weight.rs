@@ -3,9 +3,9 @@
 
 use calibration::benchmark::session::record;
 use calibration::benchmark::world::{Fault, Kind as Motion, World};
-use calibration::diagnose::clips::admit::Admitted;
 use calibration::diagnose::{Diagnosis, Kind, Options, diagnose_clips};
 use calibration::identify::arm;
+use inference::admit::Admitted;
 use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::recording::{Session, SessionFiles};

@@ -3,6 +3,7 @@
 //!
 //! | module | owns |
 //! |---|---|
+//! | [`admit`] | which recorded clips can be used, and what each is for |
 //! | [`child_output`] | what other programs say on their pipes |
 //! | [`engine`] | another program that simulates the arm |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
@@ -34,6 +35,7 @@
 //! | class | candidates that these clips cannot tell apart |
 //! | shrink | `1 - after / before` of the mean squared residual on held-out clips |
 
+pub mod admit;
 pub mod child_output;
 pub mod engine;
 pub mod estimate;

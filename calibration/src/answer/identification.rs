@@ -1,6 +1,7 @@
 //! What an identification found. SI units.
 
 use super::Trace;
+use inference::admit::LeftOut;
 use inference::engine::Used;
 use serde::ser::SerializeStruct as _;
 use serde::{Serialize, Serializer};
@@ -144,13 +145,6 @@ pub struct Clips {
     pub holdout: Vec<String>,
     /// Not usable, and why.
     pub left_out: Vec<LeftOut>,
-}
-
-/// A clip that was not used.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
-    pub file: String,
-    pub why: String,
 }
 
 /// How far the twin is off in one clip.

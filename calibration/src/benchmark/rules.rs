@@ -7,7 +7,7 @@
 //! None of them treats what varies from clip to clip as such, and none of them can refuse.
 
 use super::score::Said;
-use crate::diagnose::clips::split::Split;
+
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::shortlist;
@@ -15,6 +15,7 @@ use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use inference::likelihood::Evidence;
 use inference::likelihood::random_effects::RandomEffects;
 use inference::estimate::quadratic::minimum;
+use inference::admit::Split;
 use nalgebra::DMatrix;
 
 /// Names in the order of [`all`].

@@ -4,16 +4,17 @@
 use super::rules;
 use super::score::{Case, Said, Truth};
 use super::world::World;
-use crate::diagnose::clips::admit::{Admitted, Refused};
-use crate::diagnose::clips::split::Split;
+
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::sweep::Precision;
+use crate::diagnose::ground::Ground;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::library::Library;
 use crate::diagnose::search::baseline;
 use crate::diagnose::{DiagnoseError, Diagnosis, Kind, Options, diagnose_clips, peaks};
+use inference::admit::{Admitted, Refused, Split};
 use inference::interrupt::Interrupt;
 use inference::kept::Kept;
 use inference::likelihood::Evidence;
@@ -38,7 +39,7 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let found = diagnose_clips(&session, &admitted, &options, interrupt)?;
     let base = setting::complete(&world.cell, None)?;
     let peaks = peaks(&world.cell, &admitted, &base)?;
-    let library = Library::new(&world.cell, &base, admitted.ground().as_ref(), &peaks);
+    let library = Library::new(&world.cell, &base, Ground::crossed(&admitted).as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let arm = ArmClips::moments(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
     let split = admitted.split(options.seed);

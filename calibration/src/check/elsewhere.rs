@@ -1,7 +1,7 @@
 //! Forward kinematics against poses: the tool has to come to the object before it moves.
 
 use super::remark::{Fault, Remark};
-use crate::identify::object::screen::screened;
+use inference::admit::object_poses::looked_at;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::Clip;
 
@@ -12,7 +12,7 @@ pub(super) fn remark(file: &str, clip: &Clip, cell: &Cell) -> Option<Remark> {
     }
     // What the reader noticed is a remark already.
     let silent = Clip { warnings: Vec::new(), damage: None, ..clip.clone() };
-    let what = screened(silent, cell).elsewhere?;
+    let what = looked_at(silent, cell).elsewhere?;
     let remedy =
         "put `[tool]`, `[table]` and `[robot] base_frame` of cell.toml right, or publish the poses in the base frame";
     Some(Remark::new(Fault::PosesElsewhere, file, "object poses", what).mended_by(remedy))

@@ -1,11 +1,12 @@
 //! Which verbs each clip is good for, by the rules by which these admit clips, and what is missing for a verb.
 
 use super::remark::{Remark, Severity};
-use crate::diagnose::clips::admit;
 use crate::identify::arm::ArmError;
-use crate::identify::object::{ObjectError, shows_object};
-use crate::identify::remarks::grouped;
+use crate::identify::object::ObjectError;
 use inference::likelihood::arm::ArmClips;
+use inference::admit::admit;
+use inference::admit::look::{for_diagnosis, for_object};
+use inference::admit::remarks::grouped;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::recording::{Clip, PictureKind, ReadError, Session, for_pictures};
@@ -140,7 +141,7 @@ impl Rules {
         if clip.kind == ClipKind::Excitation {
             return Err("no object moves in it".into());
         }
-        shows_object(clip.clone(), cell, self.arm.as_ref().ok()).map(|_| ())
+        for_object(clip.clone(), cell, self.arm.as_ref().ok()).map(|_| ())
     }
 
     /// `of`: whether the arm is to be explained, or with it the object.
@@ -162,7 +163,7 @@ impl Rules {
         }
         commanded(clip)?;
         let arm = self.arm.as_ref().map_err(Clone::clone)?;
-        admit::looked_at(clip.clone(), &session.cell, Some(arm)).map(|_| ())
+        for_diagnosis(clip.clone(), &session.cell, Some(arm)).map(|_| ())
     }
 }
 
@@ -210,7 +211,7 @@ pub(super) fn missing(session: &Session, clips: &[(&str, &[Fitness])]) -> Vec<Mi
     };
     let mut out: Vec<Missing> = VERBS.into_iter().enumerate().filter_map(lacking).collect();
     let diagnosed = clips.iter().any(|(_, good_for)| good_for.iter().any(|f| f.good && f.verb.starts_with("diagnose")));
-    if let (true, Err(why)) = (diagnosed, admit::admit(session)) {
+    if let (true, Err(why)) = (diagnosed, admit(session)) {
         out.push(Missing { verb: "diagnose", why: why.to_string() });
     }
     out

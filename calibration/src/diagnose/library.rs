@@ -5,7 +5,7 @@
 //! play and saturation have no slope there. An effect with a form beside its size (a place, an axis, a speed) has one
 //! alternative for each of a few forms.
 
-use crate::diagnose::clips::ground::{Ground, Patch};
+use crate::diagnose::ground::{Ground, Patch};
 use crate::diagnose::known_gains;
 use inference::estimate::Unknown;
 use inference::likelihood::setting::{self, Setting, Settings};

@@ -4,11 +4,12 @@
 //! and with others. Clips are split by command: parameters are fitted on some, effects chosen on others, and the shrink is
 //! measured on the rest, which are opened once. The clip is the unit of evidence throughout.
 //!
+//! Which clips are diagnosed, and what each is for, is said in [`inference::admit`].
+//!
 //! | folder | step |
 //! |---|---|
-//! | [`clips`] | which recorded clips can be diagnosed, how much of them counts, and what each is for |
 //! | [`criteria`] | the measured numbers that decide |
-//! | [`library`], `known_gains` | the candidates as numbers; how far gains stated by value may be off |
+//! | [`library`], [`ground`], `known_gains` | the candidates as numbers; where on the table objects slid; how far gains stated by value may be off |
 //! | [`fit`] | hypotheses linearised around clips and fitted to them |
 //! | [`judge`] | how well a hypothesis predicts clips, how much of the gap it closes, how sure that is, and what is left |
 //! | [`propose`] | which candidates are tried, on what, and where their fits begin |
@@ -19,10 +20,10 @@
 //! Each needs only those above it.
 
 pub mod against;
-pub mod clips;
 pub mod conclude;
 pub mod criteria;
 pub mod fit;
+pub mod ground;
 pub mod judge;
 mod known_gains;
 pub mod library;
@@ -30,8 +31,6 @@ pub mod propose;
 pub mod search;
 #[cfg(test)]
 mod test_bench;
-#[cfg(test)]
-mod test_cell;
 #[cfg(test)]
 mod test_likelihood;
 
@@ -41,8 +40,9 @@ pub use crate::answer::diagnosis::{
 };
 
 use crate::identify::arm::{self, ArmError};
-use clips::admit::{Admitted, Refused, admit};
 use fit::bench::Bench;
+use ground::Ground;
+use inference::admit::{Admitted, Refused, admit, torques};
 use inference::engine::{Engine, EngineError, Quantity, Used};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept, Trail};
@@ -133,7 +133,7 @@ pub fn diagnose_kept(
     interrupt: &Interrupt,
 ) -> Result<(Diagnosis, Arc<Kept>), DiagnoseError> {
     let interrupt = &interrupt.within(options.budget);
-    let tracking = if options.torques { clips::torques::cell(&session.cell) } else { None };
+    let tracking = if options.torques { torques::tracking_cell(&session.cell) } else { None };
     let tracking = tracking.map(|cell| Session { cell, ..session.clone() });
     let session = match &tracking {
         None if options.torques => return Err(Refused::NoModel.into()),
@@ -153,7 +153,8 @@ pub fn diagnose_kept(
         admitted => admitted?,
     };
     let admitted = compared(admitted, options.engine.as_deref())?;
-    let alone = admitted.objects_alone().then(|| without_robot(session));
+    let alone =
+        admitted.objects_alone().then(|| Session { cell: torques::without_robot(&session.cell), ..session.clone() });
     let session = alone.as_ref().unwrap_or(session);
     let mut admitted = admitted;
     let (known, remarks) = (options.theta.as_ref(), &mut admitted.warnings);
@@ -189,12 +190,6 @@ pub fn diagnose_clips(
     if interrupt.cancelled() { Err(DiagnoseError::Interrupted("interrupted; start again".into())) } else { found }
 }
 
-/// The session with a cell in which an object moves by itself.
-fn without_robot(session: &Session) -> Session {
-    let cell = Cell { robot: None, controller: None, tool: None, ..session.cell.clone() };
-    Session { cell, ..session.clone() }
-}
-
 /// Clips with what an engine reports, too.
 fn compared(mut admitted: Admitted, engine: Option<&Engine>) -> Result<Admitted, DiagnoseError> {
     let Some(engine) = engine else { return Ok(admitted) };
@@ -222,7 +217,7 @@ fn diagnosed(
     let began = Instant::now();
     let base = setting::complete(&session.cell, options.theta.as_ref())?;
     let peaks = peaks(&session.cell, admitted, &base)?;
-    let library = Library::new(&session.cell, &base, admitted.ground().as_ref(), &peaks);
+    let library = Library::new(&session.cell, &base, Ground::crossed(admitted).as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let nominal = setting::complete(&session.cell, None)?;
     let engine = options.engine.as_ref();
@@ -239,8 +234,8 @@ fn diagnosed(
         let evidence = evidence.moved_by(options.engine.clone(), &nominal);
         examine(&evidence, &library, session, admitted, options, work)?
     };
-    if clips::torques::is_tracking(&session.cell) {
-        diagnosis.theta = clips::torques::without_law(diagnosis.theta, options.theta.as_ref());
+    if torques::is_tracking(&session.cell) {
+        diagnosis.theta = torques::without_law(diagnosis.theta, options.theta.as_ref());
     }
     diagnosis.engine = engine.map(|engine| engine.used());
     diagnosis.warnings.extend(diagnosis.engine.iter().flat_map(Used::sentences));
@@ -295,20 +290,4 @@ fn examine<E: Evidence>(
         concluded.verdict = concluded.verdict.so_far(options.budget.unwrap_or_default(), cut_short);
     }
     Ok(concluded)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::test_cell::{changed, filled};
-    use super::*;
-    use shared_mem::recording::SessionFiles;
-
-    #[test]
-    fn a_cell_without_its_robot_is_the_same_but_for_that() {
-        let cell = filled();
-        let session = Session { folder: PathBuf::new(), cell, clips: Vec::new(), files: SessionFiles::default() };
-        let changed = changed(&session.cell, &without_robot(&session).cell);
-        let of_robot = |key: &String| ["robot.", "controller.", "tool."].iter().any(|block| key.starts_with(block));
-        assert!(!changed.is_empty() && changed.iter().all(of_robot), "{changed:?}");
-    }
 }

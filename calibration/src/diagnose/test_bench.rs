@@ -4,12 +4,13 @@ use super::library::Library;
 use crate::benchmark::draw;
 use crate::benchmark::session::record;
 use crate::benchmark::world::{Fault, Kind, World};
-use crate::diagnose::clips::ground::Ground;
+
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::fit::sweep::Precision;
+use crate::diagnose::ground::Ground;
 use inference::interrupt::Interrupt;
 use inference::kept::Kept;
 use inference::likelihood::Evidence;

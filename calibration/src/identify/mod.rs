@@ -6,16 +6,14 @@
 //! | [`arm`] | gains of the controller, and arm effects on request |
 //! | [`object`] | friction, mass, centre of mass and tip friction of the object |
 //! | [`joint`] | friction and damping of a hinge or a slide of an object that moves in itself |
-//! | [`split`] | which clips are fitted and which are held out |
-//! | `remarks` | what is odd about clips, said once for all that share it |
+//! | `used` | which clips are fitted, held out, left out |
 //! | `run` | the way of searching, its progress, its interruption and resumption |
 
 pub mod arm;
 pub mod joint;
 pub mod object;
-pub(crate) mod remarks;
 mod run;
-pub mod split;
+mod used;
 
 pub use crate::answer::identification::Identification;
 pub use run::Optimizer;

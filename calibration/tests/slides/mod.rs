@@ -1,6 +1,6 @@
 //! An object that slides by itself over a table, no robot, as a session in memory. SI units.
 
-use calibration::diagnose::clips::admit::Admitted;
+use inference::admit::Admitted;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::Pose;

@@ -1,7 +1,7 @@
 //! Models of two sessions fitted to the clips of both, and how well they predict clips that they were not fitted to.
 
 use super::turned::{Model, SIDES, Side, TwoSessions, side_of};
-use crate::diagnose::clips::split::Split;
+
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::judge::gap::Residuals;
@@ -9,6 +9,7 @@ use crate::diagnose::judge::held_out;
 use crate::diagnose::judge::score::{Predicted, predict};
 use crate::diagnose::judge::trial::NEARLY_ALL;
 use inference::likelihood::Evidence;
+use inference::admit::Split;
 use inference::statistics::{median, student_sigmas};
 
 /// What all fits share.

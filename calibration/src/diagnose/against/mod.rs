@@ -34,15 +34,15 @@ pub use pair::{Pair, Unlike};
 
 use super::library::Library;
 use super::{DiagnoseError, Options, Work, peaks};
-use crate::diagnose::clips::admit::Refused;
-use crate::diagnose::clips::split::{FEW, Split};
-use crate::diagnose::clips::torques;
+
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::stages;
+use crate::diagnose::ground::Ground;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::search::{baseline, combine};
 use fits::PairBench;
+use inference::admit::{COMMANDS_TO_CHOOSE_BY, Refused, Split, torques};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept};
 use inference::likelihood::Evidence;
@@ -79,7 +79,8 @@ pub fn compare_kept(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<(Comparison, Arc<Kept>), AgainstError> {
-    let tracking = |session: &Session| torques::cell(&session.cell).map(|cell| Session { cell, ..session.clone() });
+    let tracking =
+        |session: &Session| torques::tracking_cell(&session.cell).map(|cell| Session { cell, ..session.clone() });
     let owned: Option<Vec<Session>> = if options.torques { sessions.into_iter().map(tracking).collect() } else { None };
     let sessions = match &owned {
         Some(both) => [&both[0], &both[1]],
@@ -125,7 +126,7 @@ fn compared(
     let (cell, admitted) = (&sessions[0].cell, &pair.admitted);
     let base = setting::complete(cell, options.theta.as_ref())?;
     let peaks = peaks(cell, admitted, &base)?;
-    let library = Library::new(cell, &base, admitted.ground().as_ref(), &peaks);
+    let library = Library::new(cell, &base, Ground::crossed(admitted).as_ref(), &peaks);
     let theta = |numbers: &[f64]| library.theta(numbers);
     let arm = cell.robot.as_ref().map(|_| ArmClips::moments(cell, &admitted.clips, theta)).transpose();
     let mut comparison = match arm.map_err(Refused::from)? {
@@ -199,7 +200,7 @@ fn split_of(groups: &[Vec<usize>], first_of_b: usize, seed: u64) -> Split {
         groups.iter().map(own).filter(|group| !group.is_empty()).collect()
     };
     let [of_a, of_b] = SIDES.map(of);
-    if of_a.len().min(of_b.len()) >= FEW {
+    if of_a.len().min(of_b.len()) >= COMMANDS_TO_CHOOSE_BY {
         return Split::new(groups, seed);
     }
     let nothing = Vec::new();

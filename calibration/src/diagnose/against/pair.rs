@@ -1,8 +1,8 @@
 //! Whether two sessions can be held against each other, and their clips as those of one cell.
 
-use crate::diagnose::clips::admit::{Admitted, Refused, admit};
-use crate::diagnose::clips::split;
-use crate::diagnose::clips::torques::is_tracking;
+use inference::admit::by_command;
+use inference::admit::torques::is_tracking;
+use inference::admit::{Admitted, Refused, admit};
 use shared_mem::cell::{Cell, ControllerKind, Object};
 use shared_mem::recording::Session;
 use twin::arm::ArmModel;
@@ -74,7 +74,7 @@ impl Pair {
         let clips = [a.clips, b.clips].concat();
         let shifted = b.groups.iter().map(|group| group.iter().map(|clip| clip + first_of_b).collect());
         // A measured motion is no command: two of one command differ by noise.
-        let groups = if tracking { a.groups.into_iter().chain(shifted).collect() } else { split::by_command(&clips) };
+        let groups = if tracking { a.groups.into_iter().chain(shifted).collect() } else { by_command(&clips) };
         let in_both = groups.iter().any(|group: &Vec<usize>| {
             group.iter().any(|clip| *clip < first_of_b) && group.iter().any(|clip| *clip >= first_of_b)
         });

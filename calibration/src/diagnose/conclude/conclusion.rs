@@ -7,8 +7,6 @@ use super::verdict::{self, Finding};
 use super::{advice, ranked, remedies};
 use crate::answer::diagnosis::{Change, Clips, Diagnosis, Gap, Nearest, NextMotion, Place, Rest, Share, Verdict};
 use crate::answer::{Trace, effect_in_words};
-use crate::diagnose::clips::admit::Admitted;
-use crate::diagnose::clips::split::{self, Split};
 use crate::diagnose::criteria::CLASS_IS_RIGHT;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
@@ -27,6 +25,8 @@ use crate::diagnose::search::refit;
 use crate::diagnose::{DiagnoseError, Kind, Options};
 use inference::likelihood::{Evidence, Group};
 use crate::words::{channel_in_words, words};
+use inference::admit::Admitted;
+use inference::admit::{COMMANDS_TO_CHOOSE_BY, Split};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 
@@ -244,7 +244,7 @@ fn few(admitted: &Admitted, split: &Split) -> Option<String> {
         format!(
             "only {commands} different commands: {in_parts}effects are chosen by all of them, and {in_turn} in turn is left out of the fit \
              that its gap is measured with; record {} more to have clips that nothing was chosen by",
-            split::FEW - commands
+            COMMANDS_TO_CHOOSE_BY - commands
         )
     })
 }

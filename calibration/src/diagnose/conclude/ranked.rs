@@ -5,7 +5,7 @@ use super::reason::{Judged, reason};
 use super::verdict::Finding;
 use crate::answer::diagnosis::{Candidate, Share, Status};
 use crate::diagnose::Kind;
-use crate::diagnose::clips::split::Split;
+
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
@@ -15,6 +15,7 @@ use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::judge::{confidence, held_out};
 use crate::diagnose::propose::screening;
 use inference::likelihood::Evidence;
+use inference::admit::Split;
 
 /// What nobody fitted closes nothing.
 const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };

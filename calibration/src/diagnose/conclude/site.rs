@@ -1,12 +1,12 @@
 //! Where an advice is carried out: the session, its clips that can be repeated, and how much faster they may be played. It
 //! makes commands that can be typed of what an advice asks for.
 
-use crate::diagnose::clips::torques::is_tracking;
 use capture::arm_motion::ArmMotion;
 use capture::body::Body;
 use capture::request::Kind;
 use capture::session::number_of;
 use capture::{limits, pace, recorded};
+use inference::admit::torques::is_tracking;
 use shared_mem::cell::ClipKind;
 use shared_mem::origin::Origin;
 use shared_mem::recording::{Provenance, Session};

@@ -2,9 +2,10 @@
 
 use super::gap::{Residuals, Typical};
 use super::remainder::Left;
-use crate::diagnose::clips::split::Split;
+
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use inference::likelihood::{Evidence, Group};
+use inference::admit::Split;
 
 /// A gap smaller than this, over its floor, is taken for this size.
 const LEAST_GAP: f64 = 1.2;

@@ -70,10 +70,11 @@ fn chance(clips: usize) -> f64 {
 mod tests {
     use super::super::score::Predicted;
     use super::*;
-    use crate::diagnose::clips::ground::Ground;
+
     use crate::diagnose::fit::bench::{FittedClip, Hypothesis};
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::fit::sweep::Reduced;
+    use crate::diagnose::ground::Ground;
     use crate::diagnose::test_bench::shipped;
     use inference::likelihood::random_effects_scale::Around;
     use inference::likelihood::setting;

@@ -2,12 +2,13 @@
 //! commands to keep any, every command is left out of a fit of its own in turn, and judged by that.
 
 use super::gap::Residuals;
-use crate::diagnose::clips::split::Split;
+
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::left_out::numbers_without;
 use crate::diagnose::fit::sweep::Precision;
 use inference::likelihood::Evidence;
+use inference::admit::Split;
 
 /// Enough for a fit that begins where all clips together have it.
 const EFFORT: Effort = Effort::of(8, Precision::Joints);

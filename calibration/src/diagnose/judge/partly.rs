@@ -14,9 +14,10 @@ use super::held_out::{self, Fits};
 use super::trial::{Found, Step};
 use super::{confidence, remainder};
 use crate::answer::diagnosis::Share;
-use crate::diagnose::clips::split::Split;
+
 use crate::diagnose::fit::bench::Bench;
 use inference::likelihood::Evidence;
+use inference::admit::Split;
 
 /// More than half of the squared gap: then what was found is larger than all that was not.
 const REAL_SHARE: f64 = 0.5;

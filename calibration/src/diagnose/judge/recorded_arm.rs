@@ -3,9 +3,9 @@
 
 use crate::answer::diagnosis::StageTest;
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::clips::admit::Admitted;
-use crate::diagnose::clips::torques;
 use crate::words::in_unit;
+use inference::admit::Admitted;
+use inference::admit::torques;
 use shared_mem::cell::Cell;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
@@ -22,7 +22,7 @@ pub(in crate::diagnose) fn stage_test(
     admitted: &Admitted,
     clips: &[usize],
 ) -> Result<Option<StageTest>, DiagnoseError> {
-    let Some(following) = torques::cell(cell).filter(|_| admitted.with_object && cell.robot.is_some()) else {
+    let Some(following) = torques::tracking_cell(cell).filter(|_| admitted.with_object && cell.robot.is_some()) else {
         return Ok(None);
     };
     let recorded: Option<Vec<Clip>> =

@@ -6,11 +6,12 @@ use super::remainder;
 use super::tolerance::{self, Measured};
 use crate::answer::diagnosis::{Change, Gap, SensorGap, TorqueRms};
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::clips::admit::Admitted;
+
 use crate::diagnose::fit::bench::Bench;
 use inference::likelihood::{Evidence, setting};
 use inference::likelihood::object::Replays;
 use crate::words::in_unit;
+use inference::admit::Admitted;
 use shared_mem::cell::Tolerance;
 use shared_mem::recording::Session;
 

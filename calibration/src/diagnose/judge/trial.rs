@@ -3,13 +3,13 @@
 use super::closing::closes;
 use super::gap::{Residuals, Typical};
 use super::score::{Advantage, Predicted, predict};
-use crate::diagnose::clips::split::Split;
 use crate::diagnose::criteria::OBJECT_EXCESS;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Library;
 use inference::likelihood::Evidence;
+use inference::admit::Split;
 
 /// A new effect must be worth at least this [nats], more than twice its error, and more than its numbers cost.
 pub(in crate::diagnose) const LEAST: f64 = 4.0;

@@ -4,12 +4,13 @@
 
 use super::screening::arm_gap_is_open;
 use super::starts;
-use crate::diagnose::clips::split::Split;
+
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
 use crate::diagnose::fit::{stages, undetermined};
 use crate::diagnose::judge::trial::Step;
 use crate::words::words;
+use inference::admit::Split;
 use inference::estimate::{ClipModel, Impossible};
 use inference::likelihood::arm::following::Moment;
 use inference::likelihood::random_effects::{RandomEffects, WithoutOwn};

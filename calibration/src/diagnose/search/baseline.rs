@@ -4,8 +4,7 @@
 //! and a hit elsewhere tells nothing about the gain;
 //! then the object's parameters under that arm, by the identification's own way over rough hits; then all together.
 
-use crate::diagnose::clips::admit::Admitted;
-use crate::diagnose::clips::split::Split;
+
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::sweep::Precision;
@@ -13,6 +12,7 @@ use crate::diagnose::fit::{floor, stages};
 use crate::diagnose::propose::arm_alone::ArmAlone;
 use crate::identify::{arm, object};
 use inference::likelihood::{Evidence, Likelihood};
+use inference::admit::{Admitted, Split};
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;

@@ -3,7 +3,6 @@
 
 use super::by_engine::by_engine;
 use super::refit::{last_pass, refitted, without_superfluous};
-use crate::diagnose::clips::split::Split;
 use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
 use crate::diagnose::fit::anchored::Anchored;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
@@ -21,6 +20,7 @@ use crate::diagnose::propose::signatures;
 use crate::diagnose::propose::starts;
 use inference::likelihood::{Evidence, Group, Row};
 use crate::words::words;
+use inference::admit::Split;
 use shared_mem::progress::Progress;
 
 /// At most so many effects are named.

@@ -2,8 +2,8 @@
 //! the same motion twice as large. A joint's answer is nearly linear, so twice the motion is four times the information.
 
 use super::finding::Finding;
-use super::session::Used;
 use crate::answer::identification::Advice;
+use crate::identify::used::Used;
 
 /// So many proposals.
 const PROPOSALS: usize = 3;
@@ -19,7 +19,7 @@ pub(super) fn next(finding: &Finding<'_>, clips: &Used) -> Vec<Advice> {
     let told = (0..half.len()).filter(|k| half[*k].is_finite());
     let Some(worst) = told.max_by(|a, b| relative(*a).total_cmp(&relative(*b))) else { return Vec::new() };
     let mut all = Vec::new();
-    for (clip, file) in fit.clips.iter().zip(clips.fitted()) {
+    for (clip, file) in fit.clips.iter().zip(&clips.clips.train) {
         for (gain, record) in [(1.0, format!("one more clip like {file}")), (4.0, format!("{file} twice as large"))] {
             let predicted = finding.intervals.with_more(fit, &(&clip.information * gain))[worst];
             all.push(Advice { record, parameter: finding.unknowns[worst].name.clone(), now: half[worst], predicted });

@@ -3,8 +3,8 @@
 
 use super::Model;
 use super::finding::Finding;
-use super::session::Used;
 use crate::answer::identification::{Figures, Identification};
+use crate::identify::used::Used;
 use inference::estimate::{ClipFit, Fit};
 use inference::likelihood::Setting;
 use nalgebra::DMatrix;
@@ -67,7 +67,7 @@ pub(super) fn doubts(
     }
     let rms = |figures: &Figures| figures.joint_rms_rad.unwrap_or(f64::INFINITY);
     let gap = &answer.gap;
-    if !clips.split.holdout.is_empty() && rms(&gap.holdout) > NO_BETTER * rms(&gap.holdout_before) {
+    if !clips.split.confirm.is_empty() && rms(&gap.holdout) > NO_BETTER * rms(&gap.holdout_before) {
         doubts.push(
             "on held-out clips the twin is no better than with the values it began with: `calibration diagnose` \
              says what else acts"

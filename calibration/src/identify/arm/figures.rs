@@ -1,11 +1,11 @@
 //! How far the twin is off: clip by clip and for each set of clips, with what was found and with what was known before.
 
-use super::session::Used;
 use super::{ArmError, Model};
 use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Figures, Gap, Identification};
 use crate::identify::run::RunError;
 use inference::estimate::{Random, Schedule, Subset, score};
+use crate::identify::used::Used;
 use rayon::prelude::*;
 
 /// Points of a picture's line.
@@ -33,7 +33,7 @@ pub(super) fn fill(
     numbers: [&[f64]; 2],
 ) -> Result<(), ArmError> {
     let train = clips.split.train.iter().map(|clip| (*clip, FITTED));
-    let jobs: Vec<(usize, &str)> = train.chain(clips.split.holdout.iter().map(|clip| (*clip, HELD_OUT))).collect();
+    let jobs: Vec<(usize, &str)> = train.chain(clips.split.confirm.iter().map(|clip| (*clip, HELD_OUT))).collect();
     let done: Vec<(ClipGap, Trace)> = jobs
         .par_iter()
         .map(|(clip, used)| one(model, *clip, used, random, numbers))

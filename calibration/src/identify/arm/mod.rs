@@ -27,9 +27,10 @@ mod time_step;
 mod verdict;
 
 use super::run::{Optimizer, Outcome, Run, RunError, concluded};
+use super::used::Used;
 use crate::answer::identification::Identification;
 use finding::Finding;
-use inference::engine::{Engine, Used};
+use inference::engine::{self, Engine};
 use inference::estimate::{ClipModel as _, Random, Subset, Unknown};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept};
@@ -169,7 +170,7 @@ fn identify_kept(
     let mut model = model.moved_by(options.engine.clone(), &complete(&cell, None)?);
     let clips = session::used(&options.session, &model, left_out, unusable, options.seed)?;
     let free = unknowns.clone();
-    session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
+    session::hold_dead(&model, &clips.split.train, settings.settings(), &mut unknowns);
     let before: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
     let starts: Vec<f64> = kept.once(&Fingerprint::of("starts"), || {
         let mut unknowns = unknowns.clone();
@@ -183,7 +184,7 @@ fn identify_kept(
     for (unknown, free) in unknowns.iter_mut().zip(&free) {
         (unknown.lower, unknown.upper) = (free.lower, free.upper);
     }
-    session::hold_dead(&model, &clips, settings.settings(), &mut unknowns);
+    session::hold_dead(&model, &clips.split.train, settings.settings(), &mut unknowns);
     let random = model.random();
     let mut outcome = search(options, &model, &clips, (&unknowns, &random), (kept, interrupt))?;
     let error = kept.once_if_ok(&Fingerprint::of("time step"), || {
@@ -201,9 +202,11 @@ fn identify_kept(
     answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
     answer.warnings.extend(remarks);
     answer.advice = advice::next(&finding, &clips);
-    clips.fill(&mut answer);
+    answer.warnings.extend(clips.warnings("another motion"));
+    Used::add_remarks(&mut answer);
+    answer.clips = clips.clips;
     answer.engine = options.engine.as_ref().map(|engine| engine.used());
-    answer.warnings.extend(answer.engine.iter().flat_map(Used::sentences));
+    answer.warnings.extend(answer.engine.iter().flat_map(engine::Used::sentences));
     // Of an object nothing was found.
     let given = given.cloned().unwrap_or_default();
     let theta = Theta { object: given.object, others: given.others, ..settings.theta(&outcome.fit.shared) };
@@ -276,7 +279,7 @@ fn searched(cell: &Cell, base: &Theta, also: &[String]) -> Result<Vec<(Setting, 
 fn search(
     options: &Options,
     model: &Model<'_>,
-    clips: &session::Used,
+    clips: &Used,
     (unknowns, random): (&[Unknown], &[Random]),
     (kept, interrupt): (&Kept, &Interrupt),
 ) -> Result<Outcome, ArmError> {

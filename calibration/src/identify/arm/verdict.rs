@@ -2,10 +2,11 @@
 
 use super::Model;
 use super::finding::Finding;
-use super::session::{Used, joint_of};
+use super::session::joint_of;
 use crate::answer::identification::NotIdentifiable;
 use crate::identify::run::Optimizer;
 use inference::likelihood::Setting;
+use crate::identify::used::Used;
 use crate::words::number_in_words;
 use twin::effects::{Robot, find};
 

@@ -2,10 +2,10 @@
 
 use super::fit::Found;
 use super::model::Motion;
-use super::{Looked, Material};
+use super::{Material, OfClip};
 use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Clips, Figures, Gap, Identification, NotIdentifiable, Parameter};
-use crate::identify::remarks::grouped;
+use inference::admit::remarks::grouped;
 use inference::estimate::ClipFit;
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub(super) fn answer(
         holdout_before: held_out.map_or_else(Figures::default, |_| old),
     };
     let used = || material.looked.iter().filter(|looked| !looked.motions.is_empty());
-    let files: Vec<String> = used().map(|looked| looked.clip.file.clone()).collect();
+    let files: Vec<String> = used().map(|looked| looked.file.clone()).collect();
     let mut first = 0;
     let mut by_clip = Vec::new();
     for looked in used() {
@@ -46,7 +46,7 @@ pub(super) fn answer(
         let after =
             rms(held_out.unwrap_or(&found.fit.clips).get(rows.clone()).unwrap_or_default(), &motions[rows.clone()]);
         by_clip.push(ClipGap {
-            file: looked.clip.file.clone(),
+            file: looked.file.clone(),
             used: if held_out.is_some() { "held out in turn".into() } else { "fitted".into() },
             joint_rms_rad: after.joint_rms_rad.into_iter().collect(),
             after,
@@ -111,7 +111,7 @@ fn not_identifiable(found: &Found) -> Vec<NotIdentifiable> {
     (0..found.unknowns.len()).filter_map(untold).collect()
 }
 
-fn in_words(looked: &Looked, unit: &str) -> String {
+fn in_words(looked: &OfClip, unit: &str) -> String {
     let stretch = |alone: &super::Alone| {
         let [first, last] = [alone.rows.start, alone.rows.end - 1].map(|row| looked.clip.times[row]);
         let travel = alone.motion.travel();
@@ -160,7 +160,7 @@ fn traces(material: &Material, motions: &[Motion], fits: [&[ClipFit]; 2], found:
     let joint = &material.subject.joint;
     let files = material.looked.iter().flat_map(|looked| looked.motions.iter().map(move |alone| (looked, alone)));
     let numbers = [[joint.friction, joint.damping], found.numbers()];
-    let trace = |(k, (looked, alone)): (usize, (&Looked, &super::Alone))| {
+    let trace = |(k, (looked, alone)): (usize, (&OfClip, &super::Alone))| {
         let motion = &motions[k];
         let from = looked.clip.times[alone.rows.start];
         let off = |which: usize| {
@@ -169,7 +169,7 @@ fn traces(material: &Material, motions: &[Motion], fits: [&[ClipFit]; 2], found:
             motion.times.iter().zip(motion.positions.iter().zip(&predicted)).map(row).collect()
         };
         Trace {
-            clip: looked.clip.file.clone(),
+            clip: looked.file.clone(),
             channel: joint.name.clone(),
             unit: material.subject.units()[0].into(),
             sigma: motion.sigma,

@@ -28,10 +28,11 @@ mod subject;
 mod tests;
 mod together;
 
-use super::remarks::grouped;
-use crate::answer::identification::{Identification, LeftOut};
+use crate::answer::identification::Identification;
 use alone::Alone;
 use fit::{Found, held_out, scored};
+use inference::admit::remarks::reasons;
+use inference::admit::{LeftOut, Looked, Usable};
 use inference::interrupt::Interrupt;
 use model::Motion;
 use noise::Noise;
@@ -39,7 +40,7 @@ use positions::Positions;
 use rayon::prelude::*;
 use shared_mem::output::{self, OutputError};
 use shared_mem::progress::Progress;
-use shared_mem::recording::{ReadError, Session};
+use shared_mem::recording::{Clip, ReadError, Session};
 use std::path::PathBuf;
 use std::time::Instant;
 use subject::Subject;
@@ -96,7 +97,8 @@ pub enum JointError {
 }
 
 /// A clip, and the motions in it.
-struct Looked {
+struct OfClip {
+    file: String,
     clip: Positions,
     motions: Vec<Alone>,
     /// Largest load that friction holds where the part rests [N m or N], and where that is.
@@ -107,7 +109,7 @@ struct Looked {
 struct Material {
     subject: Subject,
     noise: Noise,
-    looked: Vec<Looked>,
+    looked: Vec<OfClip>,
     left_out: Vec<LeftOut>,
 }
 
@@ -152,35 +154,25 @@ fn material(session: &Session, options: &Options) -> Result<Material, JointError
     let subject =
         Subject::of(&session.cell, options.object.as_deref(), options.joint.as_deref()).map_err(JointError::Subject)?;
     let in_question = session.cell.object_name();
-    let read = |entry: &shared_mem::cell::ClipEntry| {
-        let file = entry.file.display().to_string();
-        let clip = session.read(entry).map_err(|error| LeftOut { file: file.clone(), why: error.to_string() })?;
-        Positions::of(&file, &clip, in_question, &subject).map_err(|why| LeftOut { file, why })
-    };
-    let (mut clips, mut left_out) = (Vec::new(), Vec::new());
-    for clip in session.clips.par_iter().map(read).collect::<Vec<_>>() {
-        match clip {
-            Ok(clip) => clips.push(clip),
-            Err(why) => left_out.push(why),
-        }
-    }
-    let noise = Noise::of(clips.iter().map(|clip| clip.positions.as_slice()));
-    let looked: Vec<Looked> = clips.into_par_iter().map(|clip| Looked::of(clip, &subject, &noise)).collect();
+    let look = |clip: Clip| Ok((Positions::of(&clip, in_question, &subject)?, Vec::new()));
+    let Looked { usable, mut left_out } = Looked::of_session(session, |_| true, look);
+    let noise = Noise::of(usable.iter().map(|usable| usable.clip.positions.as_slice()));
+    let looked: Vec<OfClip> = usable.into_par_iter().map(|usable| OfClip::of(usable, &subject, &noise)).collect();
     for clip in looked.iter().filter(|looked| looked.motions.is_empty()) {
-        left_out.push(LeftOut { file: clip.clip.file.clone(), why: clip.why_none() });
+        left_out.push(LeftOut { file: clip.file.clone(), why: clip.why_none() });
     }
     Ok(Material { subject, noise, looked, left_out })
 }
 
-impl Looked {
-    fn of(clip: Positions, subject: &Subject, noise: &Noise) -> Self {
+impl OfClip {
+    fn of(Usable { file, clip, .. }: Usable<Positions>, subject: &Subject, noise: &Noise) -> Self {
         let joint = LoneJoint::new(&subject.joint, &subject.part, &clip.carrier);
         let motions = alone::motions(&clip, &joint, noise);
         let [low, high] = subject.joint.limits;
         let edge = (AT_END * (high - low)).max(3.0 * noise.sigma);
         let free = alone::rests(&clip, noise).into_iter().filter(|at| (low + edge..high - edge).contains(at));
         let holds = free.map(|at| [joint.load(at).abs(), at]).max_by(|a, b| a[0].total_cmp(&b[0]));
-        Self { clip, motions, holds }
+        Self { file, clip, motions, holds }
     }
 
     fn why_none(&self) -> String {
@@ -208,7 +200,7 @@ impl Material {
             let motions: Vec<Motion> = all.iter().map(|alone| alone.motion.clone()).collect();
             let Some(odd) = together::odd(&motions) else { break };
             let (clip, from) = (clips.remove(odd), all.remove(odd).rows.start);
-            let Positions { file, times, .. } = &self.looked[clip].clip;
+            let OfClip { file, clip: Positions { times, .. }, .. } = &self.looked[clip];
             let why = format!(
                 "the motion from {:.2} s on is left out: friction that explains the others does not explain it",
                 times[from]
@@ -236,7 +228,7 @@ impl Material {
 }
 
 fn no_motion(session: &Session, material: &Material) -> JointError {
-    let mut why = grouped(material.left_out.iter().map(|clip| (clip.file.as_str(), clip.why.as_str()))).join("; ");
+    let mut why = reasons(&material.left_out);
     if let Some(holds) = material.holds_in_words() {
         why = format!("{why}; {holds}");
     }

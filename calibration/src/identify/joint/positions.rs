@@ -19,8 +19,6 @@ const FEWEST: usize = 10;
 /// A joint over a clip.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Positions {
-    /// The clip's file.
-    pub(super) file: String,
     /// Since the first row [s].
     pub(super) times: Vec<f64>,
     /// [rad or m]
@@ -34,7 +32,7 @@ impl Positions {
     ///
     /// # Errors
     /// Why the clip is of no use, in one line.
-    pub(super) fn of(file: &str, clip: &Clip, in_question: Option<&str>, subject: &Subject) -> Result<Self, String> {
+    pub(super) fn of(clip: &Clip, in_question: Option<&str>, subject: &Subject) -> Result<Self, String> {
         let series = |name: &String| {
             let other = || clip.others.iter().find(|other| other.name == *name).map(|other| &other.series);
             let found = if in_question == Some(name) { Some(&clip.object) } else { other() };
@@ -76,7 +74,7 @@ impl Positions {
             ));
         }
         let times = stamps.iter().map(|stamp| (stamp - stamps[0]) as f64 * 1e-9).collect();
-        Ok(Self { file: file.to_owned(), times, positions, carrier: mean(&carriers) })
+        Ok(Self { times, positions, carrier: mean(&carriers) })
     }
 }
 

@@ -44,7 +44,7 @@ fn pushed(joint: &LoneJoint, speed: f64, sigma: f64, stop: f64, seed: u64) -> Po
         times.push(time);
         positions.push(position + sigma * noise);
     }
-    Positions { file: "clip.mcap".into(), times, positions, carrier: UnitQuaternion::identity() }
+    Positions { times, positions, carrier: UnitQuaternion::identity() }
 }
 
 fn motions(clips: &[Positions], joint: &LoneJoint) -> (Vec<Motion>, Noise) {

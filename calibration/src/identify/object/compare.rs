@@ -219,9 +219,9 @@ fn finished(
         seconds,
         loss_m,
         to_target: None,
-        holdout: mean(&material.split.holdout),
-        train: mean(&material.split.train),
-        clips: material.split.holdout.iter().map(clip).collect(),
+        holdout: mean(&material.used.split.confirm),
+        train: mean(&material.used.split.train),
+        clips: material.used.split.confirm.iter().map(clip).collect(),
         way,
     })
 }

@@ -31,7 +31,7 @@ pub(super) fn fill(
     let paths = paths_before.into_iter().zip(paths_after);
     answer.traces = files.zip(paths).flat_map(|(file, paths)| traces(file, material, paths)).collect();
     for (clip, usable) in material.usable.iter().enumerate() {
-        let held_out = material.split.holdout.contains(&clip);
+        let held_out = material.used.split.confirm.contains(&clip);
         answer.by_clip.push(ClipGap {
             file: usable.file.clone(),
             used: if held_out { "held out" } else { "fitted" }.into(),
@@ -44,7 +44,7 @@ pub(super) fn fill(
     let mean = |numbers: &[usize], gaps: &[Gap]| {
         Figures::mean(&numbers.iter().map(|clip| figures(&gaps[*clip])).collect::<Vec<_>>())
     };
-    let (train, holdout) = (&material.split.train, &material.split.holdout);
+    let (train, holdout) = (&material.used.split.train, &material.used.split.confirm);
     (answer.gap.train, answer.gap.train_before) = (mean(train, &after), mean(train, &before));
     (answer.gap.holdout, answer.gap.holdout_before) = (mean(holdout, &after), mean(holdout, &before));
     Ok(())
@@ -77,7 +77,7 @@ fn traces(file: &str, material: &Material, (before, after): (Path, Path)) -> imp
 /// Gap of every clip, and what is left of its object's path.
 pub(super) fn gaps(material: &Material, theta: &Theta, by: By<'_>) -> Result<(Vec<Gap>, Vec<Path>), ObjectError> {
     let replays = Replays::new(&material.cell, theta, by)?;
-    let gap = |usable: &super::material::Usable| -> Result<(Gap, Path), ObjectError> {
+    let gap = |usable: &inference::admit::Usable| -> Result<(Gap, Path), ObjectError> {
         let (clip, prediction, report) = replays.replay(usable.clip.clone())?;
         Ok((report.gap, path(&clip, &prediction)))
     };

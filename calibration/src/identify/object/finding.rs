@@ -45,7 +45,7 @@ impl<'a> Finding<'a> {
     /// The answer but for figures.
     pub(super) fn answer(&self, material: &Material) -> Identification {
         let bounded = self.unknowns.iter().zip(&self.held).filter(|(_, held)| **held);
-        let clips = material.clips();
+        let clips = material.used.clips.clone();
         let mut warnings = material.warnings();
         for (file, weight) in clips.train.iter().zip(&self.found.at.weights).filter(|(_, w)| **w < FULL_WEIGHT) {
             warnings.push(format!("{file} fits worse than the others and counts {:.0} %", weight * 100.0));

@@ -4,9 +4,6 @@
 //!
 //! | file | owns |
 //! |---|---|
-//! | `screen` | which recorded clips can be used |
-//! | `mend` | what of a tracker's mistakes can be mended |
-//! | `odd` | what is odd about a clip that can be used |
 //! | `material` | a session's clips, sorted by their use |
 //! | `fit` | the likelihood fit |
 //! | `step` | one step of it |
@@ -25,15 +22,10 @@ mod figures;
 mod finding;
 mod fit;
 mod material;
-mod mend;
-mod odd;
 mod paper;
 mod parts;
 mod polish;
-pub(crate) mod screen;
 mod step;
-#[cfg(test)]
-mod test_clip;
 mod vicinity;
 
 use super::run::{Optimizer, Outcome, Run, RunError, concluded};
@@ -52,7 +44,6 @@ use inference::likelihood::object::ObjectClips;
 use inference::likelihood::setting::{BaseError, arm_numbers, complete, object_parameters};
 use inference::likelihood::{Setting, Settings};
 use material::Material;
-pub(crate) use material::shows_object;
 use paper::SurfaceLoss;
 use parts::disagreement;
 use polish::{Searched, fit_polished};
@@ -172,8 +163,7 @@ pub fn identify_clips(
     interrupt: &Interrupt,
 ) -> Result<Identification, ObjectError> {
     let began = Instant::now();
-    let named = clips.into_iter().map(|clip| (clip.file.display().to_string(), Ok(clip))).collect();
-    let material = Material::of(cell.clone(), named, (&options.session, options.seed))?;
+    let material = Material::of_clips(cell.clone(), clips, (&options.session, options.seed))?;
     let (mut answer, _) = identify_kept(&material, options, (Kept::nothing(), interrupt))?;
     answer.seconds = began.elapsed().as_secs_f64();
     Ok(answer)

@@ -8,11 +8,11 @@ use shared_mem::recording::{Clip, ObjectSeries};
 use twin::scene::{ObjectModel, ObjectShape};
 
 /// A pose this far from the middle of its neighbours, and they nearer to each other, is the tracker's mistake [m].
-const JUMP: f64 = 0.04;
+const JUMP_BESIDE_NEIGHBOURS: f64 = 0.04;
 /// Turns by nearly half about an axis from one pose to the next are a box taken for itself turned over [rad].
-const FLIP: f64 = 2.6;
+const HALF_TURN: f64 = 2.6;
 /// A pose that is repeated more often than this was not measured anew: no filter holds a noisy pose for so long [1].
-const REPEATED: usize = 5;
+const REPEATS_OF_A_LOST_OBJECT: usize = 5;
 
 /// Poses that are the tracker's mistakes left out, a symmetric box turned back.
 pub(super) fn mended(mut clip: Clip, cell: &Cell) -> (Clip, Vec<String>) {
@@ -31,14 +31,14 @@ pub(super) fn mended(mut clip: Clip, cell: &Cell) -> (Clip, Vec<String>) {
         }
         let (before, after) = (place(row - 1), place(row + 1));
         let off = (place(row) - (before + after) * 0.5).norm();
-        off > JUMP && (after - before).norm() < off
+        off > JUMP_BESIDE_NEIGHBOURS && (after - before).norm() < off
     };
     let good: Vec<usize> = (0..all).filter(|row| !mistake(*row)).collect();
     if good.len() < all {
         remarks.push(format!(
             "{} of {all} poses jump away and back by more than {:.0} mm; they were left out",
             all - good.len(),
-            JUMP * 1e3
+            JUMP_BESIDE_NEIGHBOURS * 1e3
         ));
         clip.object = clip.object.select_rows(&good);
     }
@@ -49,12 +49,12 @@ pub(super) fn mended(mut clip: Clip, cell: &Cell) -> (Clip, Vec<String>) {
 /// at first: the tracker lost the object and published on.
 fn stood_still(series: &mut ObjectSeries) -> Option<String> {
     let poses = &series.poses;
-    if poses.windows(2).take(REPEATED).any(|pair| pair[0] == pair[1]) {
+    if poses.windows(2).take(REPEATS_OF_A_LOST_OBJECT).any(|pair| pair[0] == pair[1]) {
         return None;
     }
     let (mut good, mut at) = (Vec::new(), 0);
     for run in poses.chunk_by(|a, b| a == b) {
-        good.extend(at..at + if run.len() > REPEATED { 1 } else { run.len() });
+        good.extend(at..at + if run.len() > REPEATS_OF_A_LOST_OBJECT { 1 } else { run.len() });
         at += run.len();
     }
     let (all, left_out) = (at, at - good.len());
@@ -78,7 +78,7 @@ fn turn_back(series: &mut ObjectSeries, cell: &Cell) -> usize {
     for row in 1..series.len() {
         let before = series.poses[row - 1].isometry().rotation;
         let pose = series.poses[row].isometry();
-        if is_box && before.angle_to(&pose.rotation) > FLIP {
+        if is_box && before.angle_to(&pose.rotation) > HALF_TURN {
             let nearest = halves
                 .map(|half| pose.rotation * half)
                 .into_iter()

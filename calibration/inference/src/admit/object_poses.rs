@@ -1,9 +1,10 @@
 //! Which recorded clips can be held against the twin: an object that topples, is lost by its tracker, is never hit or lies
-//! elsewhere than the tool is noticed here, mended where that is safe, and told. Base frame, SI.
+//! elsewhere than the tool is noticed here, mended where that is safe, and said. Base frame, SI.
 
-use super::mend::mended;
-use super::odd::{oddities, rate};
 use inference::likelihood::object::Clearance;
+use super::mended::mended;
+use super::oddities::{oddities, rate};
+use crate::likelihood::object::Clearance;
 use nalgebra::Vector3;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ObjectSeries};
@@ -12,36 +13,36 @@ use twin::scene::{ObjectModel, ObjectShape};
 
 /// An object that moves this much farther from one pose to the next than before or after was lost [m]: a hit makes it
 /// fast at once, but friction does not stop it at once.
-const STEP: f64 = 0.03;
+const LOST_STEP: f64 = 0.03;
 /// No table reaches so far [m].
-const FARTHEST: f64 = 20.0;
+const FARTHEST_TABLE: f64 = 20.0;
 /// Share of poses that may be mistakes.
-const MOST_MISTAKES: f64 = 0.1;
+const MAX_SHARE_OF_MISTAKES: f64 = 0.1;
 /// Longest time without a pose while the object moves [s].
 const LONGEST_GAP: f64 = 0.2;
 /// An object leans no further while it slides [rad].
-const TOPPLED: f64 = 0.35;
+const TOPPLED_LEAN: f64 = 0.35;
 /// An object that went no farther was not hit [m].
-const NOT_HIT: f64 = 5e-3;
+const LEAST_TRAVEL_OF_A_HIT: f64 = 5e-3;
 /// A tool that came no nearer while the object moved does not push it: the poses are in another frame [m].
-const ELSEWHERE: f64 = 0.03;
+const TOOL_ELSEWHERE: f64 = 0.03;
 /// A box leans no further where it stands [rad].
-const ASKEW: f64 = 0.2;
+const LEAN_BEFORE_THE_HIT: f64 = 0.2;
 
-/// A clip that was looked at.
-pub(crate) struct Screened {
+/// A clip whose poses were looked at.
+pub struct Poses {
     /// The clip, with what could be mended mended.
-    pub(crate) clip: Clip,
+    pub clip: Clip,
     /// What is odd about it.
-    pub(crate) remarks: Vec<String>,
+    pub remarks: Vec<String>,
     /// Why its poses cannot be used, if they cannot.
-    pub(crate) unusable: Option<String>,
+    pub unusable: Option<String>,
     /// Why its poses are not those of what the arm hits, if they are not.
-    pub(crate) elsewhere: Option<String>,
+    pub elsewhere: Option<String>,
 }
 
-/// Looks at a clip.
-pub(crate) fn screened(clip: Clip, cell: &Cell) -> Screened {
+/// Looks at the poses of a clip.
+pub fn looked_at(clip: Clip, cell: &Cell) -> Poses {
     let mut remarks: Vec<String> = clip.warnings.iter().chain(&clip.damage).cloned().collect();
     let (clip, mended) = mended(clip, cell);
     remarks.extend(mended);
@@ -55,7 +56,7 @@ pub(crate) fn screened(clip: Clip, cell: &Cell) -> Screened {
     }
     remarks.extend(placed.ok().flatten());
     remarks.extend(oddities(&clip.object));
-    Screened { clip, remarks, unusable, elsewhere }
+    Poses { clip, remarks, unusable, elsewhere }
 }
 
 /// Whether the poses put the object onto its table, and what to tell if they nearly do.
@@ -71,21 +72,21 @@ fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
     }
     let place = |row: usize| poses[row].isometry().translation.vector;
     let farthest = (0..poses.len()).map(|row| place(row).norm()).fold(0.0, f64::max);
-    if farthest > FARTHEST {
+    if farthest > FARTHEST_TABLE {
         return Some(format!("its poses lie up to {farthest:.0} m from the arm's base: publish them in metres"));
     }
     let seconds = |a: usize, b: usize| (stamps_ns[b] - stamps_ns[a]) as f64 * 1e-9;
     let step = |row: &usize| (place(*row) - place(row - 1)).norm();
     let speed = |row: usize| if (1..poses.len()).contains(&row) { step(&row) / seconds(row - 1, row) } else { 0.0 };
     let jump = |row: &usize| step(row) - speed(row - 1).max(speed(row + 1)) * seconds(row - 1, *row);
-    if let Some(row) = (1..poses.len()).find(|row| jump(row) > STEP) {
+    if let Some(row) = (1..poses.len()).find(|row| jump(row) > LOST_STEP) {
         let (at, far) = (seconds(0, row), step(&row) * 1e3);
         return Some(format!(
             "the tracker lost the object: its pose jumps by {far:.0} mm at {at:.2} s and stays there"
         ));
     }
     let missing = poses.len() as f64 / (seconds(0, poses.len() - 1) * rate(&clip.object)?).max(1.0);
-    if missing < 1.0 - MOST_MISTAKES {
+    if missing < 1.0 - MAX_SHARE_OF_MISTAKES {
         return Some(format!("{:.0} % of its poses are missing", 100.0 * (1.0 - missing)));
     }
     let moving: Vec<usize> = (1..poses.len()).filter(|row| step(row) > 1.5e-3).collect();
@@ -96,11 +97,11 @@ fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
         return None;
     }
     let far = (0..poses.len()).map(|row| (place(row) - place(0)).norm()).fold(0.0, f64::max);
-    if far < NOT_HIT {
+    if far < LEAST_TRAVEL_OF_A_HIT {
         return Some(format!("the object was not hit: it moved by {:.1} mm", far * 1e3));
     }
     let askew = askew(clip, cell).unwrap_or(0.0);
-    if askew > ASKEW {
+    if askew > LEAN_BEFORE_THE_HIT {
         return Some(format!(
             "the object stands on none of its faces before it is hit, but leans by {:.0} degrees: its quaternions are stored in \
              another order than x, y, z, w, or its poses are in another frame",
@@ -109,7 +110,7 @@ fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
     }
     let up = |row: usize| poses[row].isometry().rotation * poses[0].isometry().rotation.inverse() * Vector3::z();
     let lean = (0..poses.len()).map(|row| up(row).z.clamp(-1.0, 1.0).acos()).fold(0.0, f64::max);
-    if lean > TOPPLED {
+    if lean > TOPPLED_LEAN {
         return Some(format!(
             "the object toppled: it leaned by {:.0} degrees; hit it lower or slower",
             lean.to_degrees()
@@ -122,7 +123,7 @@ fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
 fn apart(clip: &Clip, cell: &Cell) -> Option<String> {
     let mut clearance = Clearance::new(cell, clip)?;
     let nearest = (0..clip.object.len()).map(|row| clearance.gap(row)).fold(f64::INFINITY, f64::min);
-    (nearest > ELSEWHERE).then(|| {
+    (nearest > TOOL_ELSEWHERE).then(|| {
         format!(
             "the object moves, but the tool never comes nearer than {:.0} mm: the poses are not in `{}`, or tool and table in \
              cell.toml are not this cell's",
@@ -143,17 +144,17 @@ fn askew(clip: &Clip, cell: &Cell) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_clip::{cell, clip};
+    use super::super::test_object::{cell, clip};
     use super::*;
     use nalgebra::{Isometry3, UnitQuaternion};
 
     fn why(change: impl Fn(usize, &mut Isometry3<f64>)) -> Option<String> {
-        screened(clip(change), &cell()).unusable
+        looked_at(clip(change), &cell()).unusable
     }
 
     #[test]
     fn a_plain_slide_is_used_without_a_remark() {
-        let Screened { clip, remarks, unusable, .. } = screened(clip(|_, _| {}), &cell());
+        let Poses { clip, remarks, unusable, .. } = looked_at(clip(|_, _| {}), &cell());
         assert_eq!((clip.object.len(), remarks.len(), unusable), (90, 0, None));
     }
 
@@ -164,7 +165,7 @@ mod tests {
                 pose.translation.vector.y += 0.05;
             }
         };
-        let Screened { clip, remarks, unusable, .. } = screened(clip(far), &cell());
+        let Poses { clip, remarks, unusable, .. } = looked_at(clip(far), &cell());
         assert_eq!((clip.object.len(), unusable), (88, None));
         assert!(remarks[0].contains("2 of 90 poses jump"), "{remarks:?}");
     }
@@ -192,7 +193,7 @@ mod tests {
         let lost = |row: usize, pose: &mut Isometry3<f64>| {
             pose.translation.vector.x = if row < 45 { pose.translation.vector.x + shaken(row) } else { 0.575 };
         };
-        let Screened { clip, remarks, unusable, .. } = screened(clip(lost), &cell());
+        let Poses { clip, remarks, unusable, .. } = looked_at(clip(lost), &cell());
         assert_eq!((clip.object.len(), unusable), (46, None));
         assert!(remarks[0].contains("44 of 90 poses repeat"), "{remarks:?}");
         assert!(remarks[1].contains("seen until"), "{remarks:?}");
@@ -200,9 +201,9 @@ mod tests {
 
     #[test]
     fn an_object_above_its_table_is_told_and_one_below_it_left_out() {
-        let Screened { remarks, unusable, .. } = screened(clip(|_, pose| pose.translation.vector.z += 0.02), &cell());
+        let Poses { remarks, unusable, .. } = looked_at(clip(|_, pose| pose.translation.vector.z += 0.02), &cell());
         assert!(unusable.is_none() && remarks[0].contains("20 mm above the table"), "{remarks:?}");
-        let Screened { remarks, unusable, .. } = screened(clip(|_, pose| pose.translation.vector.z -= 0.02), &cell());
+        let Poses { remarks, unusable, .. } = looked_at(clip(|_, pose| pose.translation.vector.z -= 0.02), &cell());
         assert!(unusable.is_none() && remarks[0].contains("20 mm into the table"), "{remarks:?}");
         let below = why(|_, pose| pose.translation.vector.z -= 0.1).expect("a reason");
         assert!(below.contains("below the table"), "{below}");
@@ -217,7 +218,7 @@ mod tests {
         assert!(far.contains("602 m") && far.contains("metres"), "{far}");
         let mut clip = clip(|row, pose| pose.translation.vector.y += if row > 60 { 0.3 } else { 0.0 });
         clip.warnings.push("said by the reader".into());
-        let why = screened(clip, &cell()).unusable.expect("a reason");
+        let why = looked_at(clip, &cell()).unusable.expect("a reason");
         assert!(why.contains("jumps by") && why.ends_with("(said by the reader)"), "{why}");
     }
 
@@ -229,7 +230,7 @@ mod tests {
                 pose.rotation *= flip;
             }
         };
-        let Screened { clip, remarks, unusable, .. } = screened(clip(flipped), &cell());
+        let Poses { clip, remarks, unusable, .. } = looked_at(clip(flipped), &cell());
         assert_eq!(unusable, None);
         assert!(clip.object.poses.iter().all(|pose| pose.isometry().rotation.angle() < 1e-6));
         assert!(remarks[0].contains("turned by half"), "{remarks:?}");

@@ -5,33 +5,34 @@
 //! the most part met in others. Parts at the same place of clips with the same command stay together. A fifth of them in turn is
 //! left out of the fits that a gap is measured with.
 
-use super::admit::Admitted;
 use super::length;
-use super::split::{FEW, Split};
+use super::session::Admitted;
+use super::split::{COMMANDS_TO_CHOOSE_BY, Split};
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, JointSeries};
 use shared_mem::time::seconds_between;
 
 /// So many parts are made of a session: where eleven of twelve speak for an effect, that is no chance (p = 0.003).
-const WANTED: f64 = 12.0;
+const PARTS_WANTED: f64 = 12.0;
 /// No part is shorter [s]. Residuals of a model that is not exact are alike over tenths of a second, and what a command moves is
 /// over within about one.
-const SHORTEST: f64 = 1.5;
+const SHORTEST_PART: f64 = 1.5;
 
 /// Fits that a gap is measured with leave out one of so many sets of parts in turn: as many fits as with four or five whole clips.
-const SETS: usize = 5;
+const SETS_IN_TURN: usize = 5;
 
 impl Admitted {
     /// Clips of arms alone in parts, where there are fewer different commands than a session can be split by. Clips with an
     /// object stay whole: a hit is one event.
     pub fn in_parts(self) -> Self {
-        let few = self.commands < FEW && self.clips.iter().all(|clip| clip.kind == ClipKind::Excitation);
+        let few =
+            self.commands < COMMANDS_TO_CHOOSE_BY && self.clips.iter().all(|clip| clip.kind == ClipKind::Excitation);
         let seconds = |group: &Vec<usize>| {
             let of = |clip: &usize| span(&self.clips[*clip]);
             group.iter().map(of).map(|[from, to]| seconds_between(from, to)).fold(f64::INFINITY, f64::min)
         };
         let all: f64 = self.groups.iter().map(seconds).sum();
-        let length = (all / WANTED).max(SHORTEST);
+        let length = (all / PARTS_WANTED).max(SHORTEST_PART);
         let counts: Vec<usize> =
             self.groups.iter().map(|group| (seconds(group) / length).round().max(1.0) as usize).collect();
         let parts: usize = counts.iter().sum();
@@ -53,15 +54,15 @@ impl Admitted {
 
     /// Which clips are for what.
     pub fn split(&self, seed: u64) -> Split {
-        if self.commands >= FEW {
+        if self.commands >= COMMANDS_TO_CHOOSE_BY {
             return Split::new(&self.groups, seed);
         }
         if self.groups.len() == self.commands {
             return Split::in_turn(&self.groups);
         }
-        let mut sets = vec![Vec::new(); SETS];
+        let mut sets = vec![Vec::new(); SETS_IN_TURN];
         for (place, group) in self.groups.iter().enumerate() {
-            sets[place % SETS].extend(group);
+            sets[place % SETS_IN_TURN].extend(group);
         }
         sets.retain(|set| !set.is_empty());
         Split::in_turn(&sets)

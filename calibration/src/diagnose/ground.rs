@@ -1,17 +1,18 @@
 //! Where on the table objects slid. A patch of another friction shows only where its edge crosses their ways, so that is
 //! where it is looked for.
 
+use inference::admit::Admitted;
 use shared_mem::recording::Clip;
 use std::f64::consts::FRAC_PI_4;
 
 /// Places on a way are so far apart [m]: noise of a tracker is no way.
-const STEP: f64 = 5e-3;
+const PLACES_APART: f64 = 5e-3;
 /// Where nothing slid, as if so far [m].
-const LEAST: f64 = 0.02;
+const LEAST_SPREAD: f64 = 0.02;
 /// A line beside the middle is this share of the spread away from it.
-const ASIDE: f64 = 0.7;
+const LINE_ASIDE: f64 = 0.7;
 /// Angle of the first of eight directions [rad]: not along an axis of the table, nor where angles wrap round.
-const FIRST: f64 = -3.0;
+const FIRST_DIRECTION: f64 = -3.0;
 
 /// The part of the table that objects crossed, in the base frame [m].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +35,11 @@ pub struct Patch {
 }
 
 impl Ground {
+    /// What the objects of a session crossed; `None` where it is the arm that its clips are for.
+    pub fn crossed(admitted: &Admitted) -> Option<Self> {
+        Self::of(&admitted.clips).filter(|_| admitted.with_object)
+    }
+
     /// What the clips' objects crossed; `None` where none was tracked.
     pub fn of(clips: &[Clip]) -> Option<Self> {
         let mut places: Vec<[f64; 2]> = Vec::new();
@@ -41,7 +47,7 @@ impl Ground {
             let mut last: Option<[f64; 2]> = None;
             for pose in &clip.object.poses {
                 let [x, y, _] = pose.position();
-                if last.is_none_or(|[a, b]: [f64; 2]| (x - a).hypot(y - b) > STEP) {
+                if last.is_none_or(|[a, b]: [f64; 2]| (x - a).hypot(y - b) > PLACES_APART) {
                     last = Some([x, y]);
                     places.push([x, y]);
                 }
@@ -50,12 +56,12 @@ impl Ground {
         let mean = |of: &dyn Fn(&[f64; 2]) -> f64| places.iter().map(of).sum::<f64>() / places.len() as f64;
         let middle = [mean(&|place| place[0]), mean(&|place| place[1])];
         let square = mean(&|place| (place[0] - middle[0]).powi(2) + (place[1] - middle[1]).powi(2));
-        (!places.is_empty()).then(|| Self { middle, spread: square.sqrt().max(LEAST) })
+        (!places.is_empty()).then(|| Self { middle, spread: square.sqrt().max(LEAST_SPREAD) })
     }
 
     /// Where to look for a patch: beyond lines through the middle and beside it, and in discs whose edges pass through it.
     pub fn patches(&self) -> Vec<Patch> {
-        let angles = || (0..8).map(|eighth| FIRST + f64::from(eighth) * FRAC_PI_4);
+        let angles = || (0..8).map(|eighth| FIRST_DIRECTION + f64::from(eighth) * FRAC_PI_4);
         let [x, y] = self.middle;
         let line = |aside: f64| {
             let beyond = aside * self.spread;
@@ -69,7 +75,7 @@ impl Ground {
             let distance = centre[0].hypot(centre[1]) - self.spread;
             Patch { direction: centre[1].atan2(centre[0]), distance, curvature: self.spread.recip() }
         };
-        line(0.0).chain(line(ASIDE)).chain(angles().map(disc)).collect()
+        line(0.0).chain(line(LINE_ASIDE)).chain(angles().map(disc)).collect()
     }
 }
 
@@ -110,7 +116,7 @@ mod tests {
             } else {
                 x * along[0] + y * along[1] - patch.distance
             };
-            let expected = if (8..16).contains(&k) { -ASIDE * ground.spread } else { 0.0 };
+            let expected = if (8..16).contains(&k) { -LINE_ASIDE * ground.spread } else { 0.0 };
             assert!((inside - expected).abs() < 1e-12, "{k}: {inside}");
         }
     }

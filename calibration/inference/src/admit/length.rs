@@ -2,17 +2,18 @@
 //! candidate simulates all that counts a hundred times.
 
 use inference::likelihood::smoothing;
+use crate::likelihood::smoothing;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, JointSeries};
 
 /// So much motion counts in all [s]. Residuals of a model that is not exact are alike over tenths of a second, so this holds some
 /// hundred that say something of their own in every channel, more than the numbers of any hypothesis; it is three times what the
 /// simulated sessions have in which effects are told apart (34 s).
-const ENOUGH: f64 = 96.0;
+const ENOUGH_MOTION: f64 = 96.0;
 /// Commands from before the part that counts are kept for so long: some are still on their way [ns].
-const BEFORE_NS: u64 = 500_000_000;
+const COMMANDS_BEFORE_NS: u64 = 500_000_000;
 /// Parts of a clip that are compared begin this share of their length apart.
-const APART: f64 = 0.05;
+const PARTS_APART: f64 = 0.05;
 
 /// Cuts the longest clips of arms alone to one length, so that 96 s are left: of each the part in which its commands move
 /// the joints most. What was done, for the reader.
@@ -40,7 +41,8 @@ pub fn liveliest(clips: &mut [Clip]) -> Option<String> {
 /// hundredths of a rad/s, and late.
 pub(super) fn part(clip: &Clip, [from_ns, to_ns]: [u64; 2]) -> Clip {
     let commands = &clip.desired.stamps_ns;
-    let holds = commands.partition_point(|stamp| *stamp <= from_ns.saturating_sub(BEFORE_NS)).saturating_sub(1);
+    let holds =
+        commands.partition_point(|stamp| *stamp <= from_ns.saturating_sub(COMMANDS_BEFORE_NS)).saturating_sub(1);
     let commanded_from_ns = commands.get(holds).copied().unwrap_or_default();
     let (mut measured, desired) =
         (clip.measured.between(from_ns..=to_ns), clip.desired.between(commanded_from_ns..=to_ns));
@@ -52,11 +54,11 @@ pub(super) fn part(clip: &Clip, [from_ns, to_ns]: [u64; 2]) -> Clip {
     Clip { measured, desired, ..clip.clone() }
 }
 
-/// The length beyond which clips are cut so that all of them together last [`ENOUGH`]; `None` where they are no longer.
+/// The length beyond which clips are cut so that all of them together last [`ENOUGH_MOTION`]; `None` where they are no longer.
 fn equal_share(seconds: &[f64]) -> Option<f64> {
     let mut ascending = seconds.to_vec();
     ascending.sort_unstable_by(f64::total_cmp);
-    let mut left = ENOUGH;
+    let mut left = ENOUGH_MOTION;
     for (place, length) in ascending.iter().enumerate() {
         let share = left / (ascending.len() - place) as f64;
         if *length > share {
@@ -73,7 +75,7 @@ fn liveliest_part(commands: &JointSeries, measured: &JointSeries, most: f64) -> 
         return [0, u64::MAX];
     };
     let length_ns = (most * 1e9) as u64;
-    let step_ns = ((most * APART * 1e9) as usize).max(1);
+    let step_ns = ((most * PARTS_APART * 1e9) as usize).max(1);
     let starts = (*first..=last.saturating_sub(length_ns).max(*first)).step_by(step_ns);
     let way = ways(commands);
     let at = |ns: u64| way[commands.stamps_ns.partition_point(|stamp| *stamp < ns).min(way.len() - 1)];

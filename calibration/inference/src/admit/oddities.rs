@@ -45,17 +45,17 @@ fn cut_short(series: &ObjectSeries) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_clip::clip;
+    use super::super::test_object::clip;
     use super::*;
 
-    fn told(rows: usize) -> Vec<String> {
+    fn said(rows: usize) -> Vec<String> {
         oddities(&clip(|_, _| {}).object.select_rows(&(0..rows).collect::<Vec<_>>()))
     }
 
     #[test]
     fn poses_that_end_while_the_object_moves_or_come_slowly_are_told_with_what_to_do() {
-        assert_eq!(told(90), [""; 0]);
-        let cut = told(45);
+        assert_eq!(said(90), [""; 0]);
+        let cut = said(45);
         assert!(cut.len() == 1 && cut[0].contains("still moves at") && cut[0].contains("camera"), "{cut:?}");
         let slow = oddities(&clip(|_, _| {}).object.select_rows(&(0..90).step_by(4).collect::<Vec<_>>()));
         assert!(slow.len() == 1 && slow[0].contains("15 Hz"), "{slow:?}");
