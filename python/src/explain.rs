@@ -124,7 +124,7 @@ pub(crate) fn identify_arm(
         let provenance = Provenance::of(&opened);
         gate::unmixed(&provenance, mix)?;
         let engine = engine(engine_command, engine_limit, &opened, interrupt)?;
-        let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed, engine };
+        let options = arm::Options { session, cell, object: None, also, optimizer, out, parameters, budget, seed, engine };
         text(arm::identify(&options, interrupt)?, &provenance)
     })
 }
@@ -153,7 +153,7 @@ pub(crate) fn identify_object(
         let provenance = Provenance::of(&opened);
         gate::unmixed(&provenance, mix)?;
         let engine = engine(engine_command, engine_limit, &opened, interrupt)?;
-        let options = object::Options { session, cell, object, optimizer, out, parameters, budget, seed, engine };
+        let options = object::Options { session, cell, object, also: Vec::new(), optimizer, out, parameters, budget, seed, engine };
         text(object::identify(&options, interrupt)?, &provenance)
     })
 }

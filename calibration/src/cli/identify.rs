@@ -3,7 +3,7 @@
 use super::engine::{EngineArguments, heard};
 use super::print;
 use calibration::check::gate::{self, Allowed};
-use calibration::identify::{Identification, Optimizer, arm, joint, object};
+use calibration::identify::{Identification, Optimizer, Options, arm, joint, object};
 use calibration::report::{identification, terminal};
 use clap::{Subcommand, ValueEnum};
 use inference::interrupt::Interrupt;
@@ -204,14 +204,16 @@ pub(super) fn run(identify: Identify, interrupt: &Interrupt) -> anyhow::Result<(
             let engine = engine.start(opened, interrupt)?;
             let Task { session, cell, optimizer, out, parameters, seed, .. } = task;
             let (optimizer, budget, asked) = (optimizer.optimizer(), budget as usize, engine.clone());
-            let options = arm::Options { session, cell, optimizer, out, parameters, also, budget, seed, engine };
+            let options =
+                Options { session, cell, object: None, also, optimizer, out, parameters, budget, seed, engine };
             heard(asked.as_ref(), arm::identify(&options, interrupt).map_err(anyhow::Error::from))
         }),
         Identify::Object(ObjectArguments { task, object, engine, budget }) => task.run(|task, opened| {
             let engine = engine.start(opened, interrupt)?;
             let Task { session, cell, optimizer, out, parameters, seed, .. } = task;
             let (optimizer, budget, asked) = (optimizer.optimizer(), budget as usize, engine.clone());
-            let options = object::Options { session, cell, object, optimizer, out, parameters, budget, seed, engine };
+            let options =
+                Options { session, cell, object, also: Vec::new(), optimizer, out, parameters, budget, seed, engine };
             heard(asked.as_ref(), object::identify(&options, interrupt).map_err(anyhow::Error::from))
         }),
         Identify::Joint(arguments) => arguments.run(interrupt),

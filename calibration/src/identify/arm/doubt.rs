@@ -2,8 +2,8 @@
 //! whole, the clips are not of one robot. Each in one sentence with the remedy.
 
 use super::Model;
-use super::finding::Finding;
 use crate::answer::identification::{Figures, Identification};
+use crate::identify::finding::Finding;
 use crate::identify::used::Used;
 use inference::estimate::{ClipFit, Fit};
 use inference::likelihood::Setting;
@@ -11,15 +11,15 @@ use nalgebra::DMatrix;
 use twin::effects::{Parameter, Search, registry};
 
 /// Residuals this many times as large as their sigmas are no noise.
-const NOT_NOISE: f64 = 3.0;
+const BEYOND_NOISE: f64 = 3.0;
 /// An error that is no smaller than this share of what it was before is no better.
 const NO_BETTER: f64 = 0.95;
 /// Clips of one robot do not leave so little of their squared error when each may have numbers of its own.
-const ALONE: f64 = 0.3;
+const SHARE_LEFT_ALONE: f64 = 0.3;
 /// A common delay that explains this share of what is left is worth searching.
-const DELAYED: f64 = 0.5;
+const SHARE_OF_A_DELAY: f64 = 0.5;
 /// So many clips tell a delay.
-const CLIPS: usize = 3;
+const CLIPS_FOR_A_DELAY: usize = 3;
 /// Numbers that hang together closer than this are held by a little of their own information.
 const RIDGE: f64 = 1e-9;
 
@@ -32,12 +32,12 @@ pub(super) fn doubts(
     before: &[f64],
 ) -> Vec<String> {
     let mut doubts = Vec::new();
-    let fit = &finding.outcome.fit;
+    let fit = &finding.fit;
     let misfit = fit.misfit().sqrt();
-    if misfit < NOT_NOISE {
+    if misfit < BEYOND_NOISE {
         return doubts;
     }
-    if fit.clips.len() > 1 && alone(fit) < ALONE {
+    if fit.clips.len() > 1 && alone(fit) < SHARE_LEFT_ALONE {
         doubts.push(format!(
             "every clip by itself leaves {:.0} % of the squared error that they leave together: they are not of one robot, \
              or its gains were changed in between; identify them apart",
@@ -45,12 +45,12 @@ pub(super) fn doubts(
         ));
     }
     let is_lateness = |parameter: &Parameter| parameter.search == Search::Lateness;
-    let searched = finding.settings.settings().iter().filter_map(Setting::of_effect).any(is_lateness);
+    let searched = finding.settings.iter().filter_map(Setting::of_effect).any(is_lateness);
     let late = registry().iter().find(|effect| effect.parameters.iter().any(is_lateness));
     // Gains that were turned until they imitate a delay hide it.
     let delays = [&fit.shared[..], before].into_iter().filter_map(|numbers| delay(numbers, model, clips));
     let delay = delays.max_by(|a, b| a.1.total_cmp(&b.1));
-    if let Some((delay, share)) = delay.filter(|(_, share)| *share > DELAYED) {
+    if let Some((delay, share)) = delay.filter(|(_, share)| *share > SHARE_OF_A_DELAY) {
         let (share, ms) = (100.0 * share, 1e3 * delay.abs());
         if delay < 0.0 {
             doubts.push(format!(
@@ -103,7 +103,7 @@ fn delay(numbers: &[f64], model: &Model<'_>, clips: &Used) -> Option<(f64, f64)>
     let dof = model.arm().dof();
     // Joint by joint: sums of error x speed, speed squared, error squared.
     let mut sums = vec![[0.0; 3]; dof];
-    for clip in clips.split.train.iter().take(CLIPS) {
+    for clip in clips.split.train.iter().take(CLIPS_FOR_A_DELAY) {
         let predicted = model.predict_in(1, (*clip, numbers, &[])).ok()?;
         let clip = model.clip(*clip);
         let measured = &clip.recorded.measured;

@@ -2,19 +2,17 @@
 
 use super::{ArmError, Model};
 use crate::answer::Trace;
-use crate::answer::identification::{ClipGap, Figures, Gap, Identification};
+use crate::answer::identification::{ClipGap, Figures, Identification};
+use crate::identify::figures::{FITTED, HELD_OUT, Odd, gap, odd};
 use crate::identify::run::RunError;
 use inference::estimate::{Random, Schedule, Subset, score};
 use crate::identify::used::Used;
 use rayon::prelude::*;
 
-/// Points of a picture's line.
-const POINTS: usize = 400;
+/// Points of a picture's line (a choice: one in two pixels).
+const POINTS_OF_A_LINE: usize = 400;
 /// A clip whose error is so many times the usual one is odd: a clock that jumped, a hand on the arm.
-const ODD: f64 = 5.0;
-/// A use of a clip.
-const FITTED: &str = "fitted";
-const HELD_OUT: &str = "held out";
+const TIMES_THE_USUAL_ERROR: f64 = 5.0;
 
 /// Measured less predicted positions at the rows that count.
 struct Errors {
@@ -38,33 +36,20 @@ pub(super) fn fill(
         .par_iter()
         .map(|(clip, used)| one(model, *clip, used, random, numbers))
         .collect::<Result<_, RunError>>()?;
-    let mean = |used: &str, of: fn(&ClipGap) -> Figures| {
-        let figures: Vec<Figures> = done.iter().filter(|(gap, _)| gap.used == used).map(|(gap, _)| of(gap)).collect();
-        Figures::mean(&figures)
-    };
-    answer.gap = Gap {
-        train: mean(FITTED, |gap| gap.after),
-        holdout: mean(HELD_OUT, |gap| gap.after),
-        train_before: mean(FITTED, |gap| gap.before),
-        holdout_before: mean(HELD_OUT, |gap| gap.before),
-    };
     (answer.by_clip, answer.traces) = done.into_iter().unzip();
+    answer.gap = gap(&answer.by_clip);
     answer.warnings.extend(odd_clips(&answer.by_clip));
     Ok(())
 }
 
 fn odd_clips(clips: &[ClipGap]) -> Vec<String> {
-    let error = |clip: &ClipGap| clip.after.joint_rms_rad.unwrap_or(0.0);
-    let mut sorted: Vec<f64> = clips.iter().map(error).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
-    let odd = clips.iter().filter(|clip| clips.len() > 2 && error(clip) > ODD * usual);
-    odd.map(|clip| {
+    let all = odd(clips, |clip| clip.after.joint_rms_rad.unwrap_or(0.0), TIMES_THE_USUAL_ERROR, 0.0);
+    let all = all.into_iter();
+    all.map(|Odd { clip, error, usual }| {
         format!(
-            "{}: its error is {:.0} times the usual one: look at its clock, its load and who touched the arm, and \
-             identify without it",
+            "{}: its error is {:.0} times the usual one: look at its clock, its load and who touched the arm, and identify without it",
             clip.file,
-            error(clip) / usual
+            error / usual
         )
     })
     .collect()
@@ -138,6 +123,6 @@ fn figures(errors: &Errors) -> Figures {
 }
 
 fn line(errors: &Errors, joint: usize) -> Vec<[f64; 2]> {
-    let every = errors.times.len().div_ceil(POINTS).max(1);
+    let every = errors.times.len().div_ceil(POINTS_OF_A_LINE).max(1);
     errors.times.iter().zip(&errors.rows).step_by(every).map(|(time, row)| [*time, row[joint]]).collect()
 }

@@ -8,16 +8,12 @@
 //! | `start` | where the search begins when little is known |
 //! | `saturation` | the same for a limit of the torques |
 //! | `time_step` | what the twin's time step does to the numbers, and that it is taken out |
-//! | `finding` | what a fit tells, number by number |
 //! | `figures` | how far the twin is off |
-//! | `verdict` | what the clips cannot tell, and why |
+//! | `verdict` | what the clips cannot tell, and why; what to record next |
 //! | `doubt` | what speaks against trusting the fit |
-//! | `advice` | what to record next |
 
-mod advice;
 mod doubt;
 mod figures;
-mod finding;
 mod law;
 mod measured_stiffness;
 mod saturation;
@@ -26,12 +22,13 @@ mod start;
 mod time_step;
 mod verdict;
 
-use super::run::{Optimizer, Outcome, Run, RunError, concluded};
+use super::finding::Finding;
+pub use super::options::Options;
+use super::run::{Outcome, Run, RunError, concluded};
 use super::used::Used;
 use crate::answer::identification::Identification;
-use finding::Finding;
-use inference::engine::{self, Engine};
-use inference::estimate::{ClipModel as _, Random, Subset, Unknown};
+use inference::engine;
+use inference::estimate::{ClipModel as _, Intervals, Random, Subset, Unknown, at_bounds};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept};
 use inference::likelihood::arm::ArmClips;
@@ -43,34 +40,9 @@ use shared_mem::output::OutputError;
 use shared_mem::recording::{Clip, ReadError, SessionFiles};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file::TomlFileError;
-use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Instant;
 use twin::arm::{ArmModel, ModelError};
 use twin::effects::{EffectInfo, Robot, Stage, find, registry};
-
-/// What to identify, and how.
-#[derive(Debug, Clone, Default)]
-pub struct Options {
-    /// The session's folder, or a clip beside a cell.toml.
-    pub session: PathBuf,
-    /// The cell.toml, where it does not lie beside the clips.
-    pub cell: Option<PathBuf>,
-    /// The way of searching.
-    pub optimizer: Optimizer,
-    /// Where the parameters go.
-    pub out: Option<PathBuf>,
-    /// Parameters that are known already.
-    pub parameters: Option<PathBuf>,
-    /// Effects whose parameters are searched besides.
-    pub also: Vec<String>,
-    /// Points whose cost a search without slopes may ask for.
-    pub budget: usize,
-    /// Draws the clips that are held out, and the searches.
-    pub seed: u64,
-    /// Another program that simulates the arm in place of the twin.
-    pub engine: Option<Arc<Engine>>,
-}
 
 /// The arm cannot be identified.
 #[derive(Debug, thiserror::Error)]
@@ -109,6 +81,10 @@ pub enum ArmError {
     #[error(transparent)]
     Output(#[from] OutputError),
 }
+
+/// Said where a search ended with its budget or was stopped.
+const UNFINISHED: &str = "the search ended before it arrived: values and intervals are those of the place where it stopped; give more \
+                          budget, or search for what else acts";
 
 /// What a clip's prediction takes from a vector of numbers.
 type Numbers<'a> = Box<dyn Fn(&[f64]) -> Theta + Sync + 'a>;
@@ -192,16 +168,30 @@ fn identify_kept(
     });
     let open = time_step::taken_out(&mut outcome.fit, &unknowns, &error.map_err(RunError::Impossible)?);
     saturation::forget_unreached(&model, settings.settings(), &mut outcome.fit);
-    let finding = Finding::new(&settings, &unknowns, &outcome, &open);
-    let mut answer = finding.answer(&before);
+    let held = at_bounds(&unknowns, &outcome.fit.shared);
+    let mut intervals = Intervals::new(&outcome.fit, &held);
+    intervals.half_width.iter_mut().zip(&open).for_each(|(half, open)| *half = half.hypot(*open));
+    let Outcome { fit, simulated, convergence, arrived } = outcome;
+    let finding = Finding {
+        settings: settings.settings(),
+        unknowns: &unknowns,
+        fit,
+        held,
+        intervals,
+        simulated,
+        convergence,
+        arrived,
+    };
+    let mut answer = finding.answer("arm", &before);
+    answer.warnings.extend((!arrived).then(|| UNFINISHED.to_owned()));
     answer.session = options.session.display().to_string();
     answer.files = SessionFiles { session: options.session.clone(), cell: options.cell.clone() };
     answer.optimizer = options.optimizer.name().into();
-    figures::fill(&mut answer, &model, &clips, &random, [&before, &outcome.fit.shared])?;
-    answer.not_identifiable = verdict::untold(&finding, &model, &clips, options.optimizer);
+    figures::fill(&mut answer, &model, &clips, &random, [&before, &finding.fit.shared])?;
+    answer.not_identifiable = verdict::not_identifiable(&finding, &model, &clips, options.optimizer);
     answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
     answer.warnings.extend(remarks);
-    answer.advice = advice::next(&finding, &clips);
+    answer.advice = verdict::next(&finding, &clips);
     answer.warnings.extend(clips.warnings("another motion"));
     Used::add_remarks(&mut answer);
     answer.clips = clips.clips;
@@ -209,7 +199,7 @@ fn identify_kept(
     answer.warnings.extend(answer.engine.iter().flat_map(engine::Used::sentences));
     // Of an object nothing was found.
     let given = given.cloned().unwrap_or_default();
-    let theta = Theta { object: given.object, others: given.others, ..settings.theta(&outcome.fit.shared) };
+    let theta = Theta { object: given.object, others: given.others, ..settings.theta(&finding.fit.shared) };
     Ok((answer, theta))
 }
 

@@ -1,46 +1,47 @@
-//! What the clips cannot tell, and why, number by number.
+//! What the clips cannot tell, and why, number by number; and what to record next.
 
 use super::Model;
-use super::finding::Finding;
 use super::session::joint_of;
-use crate::answer::identification::NotIdentifiable;
+use crate::answer::identification::{Advice, NotIdentifiable};
+use crate::identify::finding::Finding;
 use crate::identify::run::Optimizer;
 use inference::likelihood::Setting;
 use crate::identify::used::Used;
-use crate::words::number_in_words;
+
 use twin::effects::{Robot, find};
 
-/// A gain whose 95 % interval is wider than this share of it, to either side, is not told.
-const GAIN_SHARE: f64 = 0.25;
-/// A parameter of an effect whose interval is wider than this share of what is met in practice is not told.
-const EFFECT_SHARE: f64 = 0.5;
-/// Estimates that move together this closely are told apart badly.
-const TOGETHER: f64 = 0.95;
+/// A gain whose 95 % interval is wider than this share of it, to either side, is not identifiable (a choice).
+const GAIN_OPEN_FROM: f64 = 0.25;
+/// A parameter of an effect whose interval is wider than this share of the plausible range is not identifiable (a choice).
+const EFFECT_OPEN_FROM: f64 = 0.5;
+/// An interval is judged by its share of a number, or of this share of its search where the number is nearly 0 (a choice).
+const LEAST_SIZE: f64 = 0.05;
 /// Estimates that move together this closely are one number.
-const ONE: f64 = 0.99;
+const ONE_NUMBER: f64 = 0.99;
 /// Of a number that is nowhere near a bound, when the search did not arrive.
-const LOST: &str = "the search ended before it arrived: gains alone do not explain these clips";
+const DID_NOT_ARRIVE: &str = "the search ended before it arrived: gains alone do not explain these clips";
 /// An effect this near to neutral is absent, as a share of its search.
-const ABSENT: f64 = 1e-9;
+const ABSENT_BELOW: f64 = 1e-9;
 
-pub(super) fn untold(
+/// Numbers that are not identifiable.
+pub(super) fn not_identifiable(
     finding: &Finding<'_>,
     model: &Model<'_>,
     clips: &Used,
     optimizer: Optimizer,
 ) -> Vec<NotIdentifiable> {
     // A swarm ends with its budget; least squares that do not arrive have lost their way.
-    let lost = !finding.outcome.arrived && optimizer == Optimizer::LeastSquares;
+    let lost = !finding.arrived && optimizer == Optimizer::LeastSquares;
     let all = 0..finding.unknowns.len();
     all.filter_map(|k| {
-        let why = why(finding, k, model, clips).or_else(|| lost.then(|| LOST.to_owned()))?;
+        let why = why(finding, k, model, clips).or_else(|| lost.then(|| DID_NOT_ARRIVE.to_owned()))?;
         Some(NotIdentifiable { parameter: finding.unknowns[k].name.clone(), why })
     })
     .collect()
 }
 
 fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Option<String> {
-    let (unknown, setting) = (&finding.unknowns[k], &finding.settings.settings()[k]);
+    let (unknown, setting) = (&finding.unknowns[k], &finding.settings[k]);
     if unknown.lower >= unknown.upper {
         let joint = joint_of(setting).map_or(0, |joint| joint + 1);
         return Some(format!("joint {joint} follows its command in no clip: look at the joint, then record again"));
@@ -49,7 +50,7 @@ fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Opti
         Some(joint) => format!("commands move joint {} by {:.3} rad", joint + 1, commanded(joint, model, clips)),
         None => "the clips move the arm too little or too slowly".into(),
     };
-    if finding.outcome.fit.information()[(k, k)] <= 0.0 {
+    if finding.fit.information()[(k, k)] <= 0.0 {
         return Some(format!("nothing in these clips depends on it: {moves}"));
     }
     if finding.held[k] {
@@ -60,46 +61,39 @@ fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Opti
         return Some("not identifiable apart from other numbers: only a combination of them shows".into());
     }
     let (size, share) = match setting {
-        Setting::Stiffness(_) | Setting::Damping(_) => (finding.outcome.fit.shared[k].abs(), GAIN_SHARE),
-        _ => (met_width(model, setting).unwrap_or(unknown.upper - unknown.lower), EFFECT_SHARE),
+        Setting::Stiffness(_) | Setting::Damping(_) => (finding.fit.shared[k].abs(), GAIN_OPEN_FROM),
+        _ => (met_width(model, setting).unwrap_or(unknown.upper - unknown.lower), EFFECT_OPEN_FROM),
     };
     if half <= share * size {
         return None;
     }
     let percent = 100.0 * half / size;
-    if let Some((name, r)) = partner(finding, k).filter(|(_, r)| r.abs() > ONE) {
+    if let Some((name, r)) = finding.partner(k).filter(|(_, r)| r.abs() > ONE_NUMBER) {
         return Some(format!(
             "its 95 % interval is ±{percent:.0} %: only its combination with {name} shows (correlation {r:.3}); record \
              faster motions, and log them faster"
         ));
     }
-    let together = partner(finding, k)
+    let together = finding
+        .partner(k)
         .map_or_else(String::new, |(name, r)| format!(" it moves together with {name} (correlation {r:.2}) and"));
     Some(format!("its 95 % interval is ±{percent:.0} %:{together} {moves}; record larger and faster motions"))
 }
 
 /// A bound where an effect is absent is an answer; any other is the end of the search.
 fn at_bound(finding: &Finding<'_>, k: usize) -> Option<String> {
-    let (unknown, value) = (&finding.unknowns[k], finding.outcome.fit.shared[k]);
-    let setting = &finding.settings.settings()[k];
-    if matches!(setting, Setting::Effect { .. }) && value.abs() <= ABSENT * (unknown.upper - unknown.lower) {
+    let (unknown, value) = (&finding.unknowns[k], finding.fit.shared[k]);
+    let setting = &finding.settings[k];
+    if matches!(setting, Setting::Effect { .. }) && value.abs() <= ABSENT_BELOW * (unknown.upper - unknown.lower) {
         return None;
     }
-    let end = if value - unknown.lower < unknown.upper - value { "lower" } else { "upper" };
+    let end = finding.nearer_bound(k);
     let remedy = match setting {
         Setting::Stiffness(_) => "widen `stiffness_range` in cell.toml, or ask `calibration diagnose` what else acts",
         Setting::Damping(_) => "widen `damping_range` in cell.toml, or ask `calibration diagnose` what else acts",
         _ => "that is beyond what is met in practice, so something else acts",
     };
     Some(format!("the best value lies at or beyond {value:.4}, the {end} bound of the search: {remedy}"))
-}
-
-/// The number that this one moves together with most closely, and their correlation.
-fn partner(finding: &Finding<'_>, k: usize) -> Option<(String, f64)> {
-    let correlation = &finding.intervals.correlation;
-    let others = (0..correlation.ncols()).filter(|other| *other != k).map(|other| (other, correlation[(k, other)]));
-    let (other, r) = others.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-    (r.abs() > TOGETHER).then(|| (number_in_words(&finding.unknowns[other].name), r))
 }
 
 /// Farthest travel of a joint's command in a clip that was fitted [rad].
@@ -119,4 +113,18 @@ fn met_width(model: &Model<'_>, setting: &Setting) -> Option<f64> {
     let parameter = find(name)?.parameters.iter().find(|p| p.name == *parameter)?;
     let [lo, hi] = Robot::of(model.arm()).range(parameter, *index);
     Some(if *inverse { lo.recip() } else { hi - lo })
+}
+
+/// What to record next: one more clip like those there are, or the same motion twice as large. A joint's answer is nearly linear, so
+/// twice the motion is four times the information.
+pub(super) fn next(finding: &Finding<'_>, clips: &Used) -> Vec<Advice> {
+    let width = |k: usize| {
+        let unknown = &finding.unknowns[k];
+        finding.intervals.half_width[k] / finding.fit.shared[k].abs().max(LEAST_SIZE * (unknown.upper - unknown.lower))
+    };
+    let more = finding.fit.clips.iter().zip(&clips.clips.train).flat_map(|(clip, file)| {
+        [(1.0, format!("one more clip like {file}")), (4.0, format!("{file} twice as large"))]
+            .map(|(times, record)| (record, &clip.information * times))
+    });
+    finding.advice(width, more)
 }

@@ -5,6 +5,8 @@ use super::model::Motion;
 use super::{Material, OfClip};
 use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Clips, Figures, Gap, Identification, NotIdentifiable, Parameter};
+use crate::identify::figures::FITTED;
+use crate::identify::finding::rows;
 use inference::admit::remarks::grouped;
 use inference::estimate::ClipFit;
 use std::collections::BTreeMap;
@@ -41,16 +43,16 @@ pub(super) fn answer(
     let mut first = 0;
     let mut by_clip = Vec::new();
     for looked in used() {
-        let rows = first..first + looked.motions.len();
-        first = rows.end;
+        let own = first..first + looked.motions.len();
+        first = own.end;
         let after =
-            rms(held_out.unwrap_or(&found.fit.clips).get(rows.clone()).unwrap_or_default(), &motions[rows.clone()]);
+            rms(held_out.unwrap_or(&found.fit.clips).get(own.clone()).unwrap_or_default(), &motions[own.clone()]);
         by_clip.push(ClipGap {
             file: looked.file.clone(),
-            used: if held_out.is_some() { "held out in turn".into() } else { "fitted".into() },
+            used: if held_out.is_some() { "held out in turn".into() } else { FITTED.into() },
             joint_rms_rad: after.joint_rms_rad.into_iter().collect(),
             after,
-            before: rms(&before[rows.clone()], &motions[rows]),
+            before: rms(&before[own.clone()], &motions[own]),
             warnings: vec![in_words(looked, material.subject.units()[0])],
         });
     }
@@ -74,7 +76,7 @@ pub(super) fn answer(
         misfit: found.fit.misfit().sqrt(),
         converged: found.fit.converged,
         names: names.collect(),
-        correlation: found.intervals.correlation.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        correlation: rows(&found.intervals.correlation),
         warnings: warnings(material, motions, found),
         traces: traces(material, motions, [before, &found.fit.clips], found),
         ..Identification::default()

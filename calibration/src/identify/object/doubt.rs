@@ -2,18 +2,19 @@
 
 use inference::likelihood::object::noise_of;
 use crate::answer::identification::{ClipGap, Identification};
+use crate::identify::figures::{Odd, odd};
 use shared_mem::cell::Cell;
 
 /// ADD on the clips fitted, over the tracker's noise, from which on it is neither noise nor chance in the hits.
-const NOT_NOISE: f64 = 7.0;
+const BEYOND_NOISE: f64 = 7.0;
 /// A clip is none of the others' kind when its ADD is this many times the middle clip's.
-const ODD: f64 = 4.0;
+const TIMES_THE_USUAL_ERROR: f64 = 4.0;
 
 /// Doubts about a fit whose figures stand in `answer`.
 pub(super) fn doubts(answer: &Identification, cell: &Cell) -> Vec<String> {
     let noise = noise_of(cell).position;
     let mut doubts = Vec::new();
-    if let Some(add) = answer.gap.train.object_add_m.filter(|add| *add > NOT_NOISE * noise) {
+    if let Some(add) = answer.gap.train.object_add_m.filter(|add| *add > BEYOND_NOISE * noise) {
         // Diagnosing takes an arm: where there is none, nothing but the recording can be looked at.
         let advice = match cell.robot {
             Some(_) => {
@@ -30,16 +31,13 @@ pub(super) fn doubts(answer: &Identification, cell: &Cell) -> Vec<String> {
         ));
     }
     let add = |clip: &ClipGap| clip.after.object_add_m.unwrap_or_default();
-    let mut all: Vec<f64> = answer.by_clip.iter().map(add).collect();
-    all.sort_unstable_by(f64::total_cmp);
-    let middle = all.get(all.len() / 2).copied().unwrap_or_default();
-    for clip in answer.by_clip.iter().filter(|clip| add(clip) > (ODD * middle).max(NOT_NOISE * noise)) {
+    for Odd { clip, error, usual } in odd(&answer.by_clip, add, TIMES_THE_USUAL_ERROR, BEYOND_NOISE * noise) {
         doubts.push(format!(
-            "{}: the object is {:.1} mm off where it is {:.1} mm in the middle clip: look whether it was hit on an edge, \
-             pushed by something else or lost, and leave the clip out if so",
+            "{}: the object is {:.1} mm off where it is {:.1} mm in the middle clip: look whether it was hit on an edge, pushed by \
+             something else or lost, and leave the clip out if so",
             clip.file,
-            add(clip) * 1e3,
-            middle * 1e3
+            error * 1e3,
+            usual * 1e3
         ));
     }
     doubts
@@ -51,7 +49,7 @@ mod tests {
     use crate::answer::identification::Figures;
     use shared_mem::cell::Robot;
 
-    fn told(fitted: [f64; 5], cell: &Cell) -> Vec<String> {
+    fn said(fitted: [f64; 5], cell: &Cell) -> Vec<String> {
         let figures = |add: f64| Figures { object_add_m: Some(add), ..Figures::default() };
         let clip =
             |(i, add): (usize, &f64)| ClipGap { file: format!("{i}"), after: figures(*add), ..ClipGap::default() };
@@ -64,13 +62,13 @@ mod tests {
     #[test]
     fn errors_that_are_no_noise_and_a_clip_unlike_the_others_are_told() {
         let cell = Cell { robot: Some(Robot::default()), ..Cell::default() };
-        assert_eq!(told([0.002, 0.003, 0.003, 0.004, 0.002], &cell), [""; 0]);
-        let all = told([0.02, 0.03, 0.03, 0.04, 0.02], &cell);
+        assert_eq!(said([0.002, 0.003, 0.003, 0.004, 0.002], &cell), [""; 0]);
+        let all = said([0.02, 0.03, 0.03, 0.04, 0.02], &cell);
         assert!(all.len() == 1 && all[0].contains("28.0 mm off") && all[0].contains("diagnose"), "{all:?}");
         // An object alone cannot be diagnosed, so nobody is sent there.
-        let alone = told([0.02, 0.03, 0.03, 0.04, 0.02], &Cell::default());
+        let alone = said([0.02, 0.03, 0.03, 0.04, 0.02], &Cell::default());
         assert!(alone[0].contains("28.0 mm off") && !alone[0].contains("diagnose"), "{alone:?}");
-        let one = told([0.002, 0.003, 0.002, 0.018, 0.002], &cell);
+        let one = said([0.002, 0.003, 0.002, 0.018, 0.002], &cell);
         assert!(one.len() == 1 && one[0].starts_with("3: the object is 18.0 mm off"), "{one:?}");
     }
 }

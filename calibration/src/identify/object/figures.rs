@@ -4,6 +4,7 @@ use super::ObjectError;
 use super::material::Material;
 use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Figures, Identification};
+use crate::identify::figures::{FITTED, HELD_OUT, gap};
 use inference::engine::Engine;
 use inference::likelihood::object::Replays;
 use rayon::prelude::*;
@@ -34,19 +35,14 @@ pub(super) fn fill(
         let held_out = material.used.split.confirm.contains(&clip);
         answer.by_clip.push(ClipGap {
             file: usable.file.clone(),
-            used: if held_out { "held out" } else { "fitted" }.into(),
+            used: if held_out { HELD_OUT } else { FITTED }.into(),
             joint_rms_rad: after[clip].joint_rms_rad.clone().unwrap_or_default(),
             after: figures(&after[clip]),
             before: figures(&before[clip]),
             warnings: usable.remarks.clone(),
         });
     }
-    let mean = |numbers: &[usize], gaps: &[Gap]| {
-        Figures::mean(&numbers.iter().map(|clip| figures(&gaps[*clip])).collect::<Vec<_>>())
-    };
-    let (train, holdout) = (&material.used.split.train, &material.used.split.confirm);
-    (answer.gap.train, answer.gap.train_before) = (mean(train, &after), mean(train, &before));
-    (answer.gap.holdout, answer.gap.holdout_before) = (mean(holdout, &after), mean(holdout, &before));
+    answer.gap = gap(&answer.by_clip);
     Ok(())
 }
 
@@ -77,11 +73,11 @@ fn traces(file: &str, material: &Material, (before, after): (Path, Path)) -> imp
 /// Gap of every clip, and what is left of its object's path.
 pub(super) fn gaps(material: &Material, theta: &Theta, by: By<'_>) -> Result<(Vec<Gap>, Vec<Path>), ObjectError> {
     let replays = Replays::new(&material.cell, theta, by)?;
-    let gap = |usable: &inference::admit::Usable| -> Result<(Gap, Path), ObjectError> {
+    let replayed = |usable: &inference::admit::Usable| -> Result<(Gap, Path), ObjectError> {
         let (clip, prediction, report) = replays.replay(usable.clip.clone())?;
         Ok((report.gap, path(&clip, &prediction)))
     };
-    let done: Vec<(Gap, Path)> = material.usable.par_iter().map(gap).collect::<Result<_, _>>()?;
+    let done: Vec<(Gap, Path)> = material.usable.par_iter().map(replayed).collect::<Result<_, _>>()?;
     Ok(done.into_iter().unzip())
 }
 

@@ -1,158 +1,101 @@
-//! What a fit tells about the object, number by number: value, interval, and what the clips cannot tell and why.
+//! What a fit says about the object, number by number: what the clips cannot tell and why, and what to record next.
 
 use super::fit::ObjectFit;
 use super::material::Material;
-use crate::answer::identification::{Advice, Identification, NotIdentifiable, Parameter};
-use crate::words::number_in_words;
-use inference::estimate::{Fit, Intervals, Unknown};
+use crate::answer::identification::{Identification, NotIdentifiable};
+use inference::estimate::Unknown;
 use inference::likelihood::{Setting, Settings};
-use std::collections::BTreeMap;
+use crate::identify::finding::Finding;
 
-/// An interval wider than this share of the search's range, to either side, tells nothing.
-const RANGE_SHARE: f64 = 0.25;
-/// Nor does one of friction or mass wider than this share of the value.
-const VALUE_SHARE: f64 = 0.3;
-/// Estimates that move together this closely are told apart badly.
-const TOGETHER: f64 = 0.9;
-/// Motions that are proposed.
-const PROPOSALS: usize = 3;
-/// A clip that counts less than this is told.
+/// A number is not identifiable where half its interval is more than this share of its range (a choice),
+const OPEN_FROM_SHARE_OF_RANGE: f64 = 0.25;
+/// nor are friction and mass where it is more than this share of the value (a choice).
+const OPEN_FROM_SHARE_OF_VALUE: f64 = 0.3;
+/// Weight of a clip below which it is said (a choice).
 const FULL_WEIGHT: f64 = 0.99;
 
-/// Everything that a fit tells.
-pub(super) struct Finding<'a> {
-    settings: &'a Settings,
-    unknowns: &'a [Unknown],
-    found: &'a ObjectFit,
-    fit: Fit,
-    held: Vec<bool>,
-    intervals: Intervals,
+/// The fit with its intervals; `disagreement`: half widths that they have at least.
+pub(super) fn finding<'a>(
+    (settings, unknowns): (&'a Settings, &'a [Unknown]),
+    found: &ObjectFit,
+    disagreement: &[f64],
+) -> Finding<'a> {
+    let (fit, held, mut intervals) = found.at.estimate(unknowns);
+    intervals.half_width.iter_mut().zip(&found.widths).for_each(|(half, width)| *half *= width);
+    intervals.half_width.iter_mut().zip(disagreement).for_each(|(half, least)| *half = half.max(*least));
+    Finding {
+        settings: settings.settings(),
+        unknowns,
+        fit,
+        held,
+        intervals,
+        simulated: found.evaluations,
+        convergence: found.convergence.clone(),
+        arrived: found.converged,
+    }
 }
 
-impl<'a> Finding<'a> {
-    /// `disagreement`: half widths that intervals have at least.
-    pub(super) fn new(
-        (settings, unknowns): (&'a Settings, &'a [Unknown]),
-        found: &'a ObjectFit,
-        disagreement: &[f64],
-    ) -> Self {
-        let (fit, held, mut intervals) = found.at.estimate(unknowns);
-        intervals.half_width.iter_mut().zip(&found.widths).for_each(|(half, width)| *half *= width);
-        intervals.half_width.iter_mut().zip(disagreement).for_each(|(half, least)| *half = half.max(*least));
-        Self { settings, unknowns, found, fit, held, intervals }
+/// The answer but for figures; `weights`: how much every clip counts in the fit.
+pub(super) fn answer(finding: &Finding<'_>, weights: &[f64], material: &Material) -> Identification {
+    let starts: Vec<f64> = finding.unknowns.iter().map(|unknown| unknown.start).collect();
+    let mut answer = finding.answer("object", &starts);
+    answer.clips = material.used.clips.clone();
+    answer.warnings = material.warnings();
+    for (file, weight) in answer.clips.train.iter().zip(weights).filter(|(_, weight)| **weight < FULL_WEIGHT) {
+        answer.warnings.push(format!("{file} fits worse than the others and counts {:.0} %", weight * 100.0));
     }
+    if (0..finding.unknowns.len()).all(|k| !shows(finding, k)) {
+        answer.warnings.push(
+            "nothing in these clips depends on any of the numbers: all of them stay where the search began; record clips in which \
+             the object is hit and slides"
+                .into(),
+        );
+    }
+    let open = |k: usize| {
+        Some(NotIdentifiable { parameter: finding.unknowns[k].name.clone(), why: why(finding, k, material)? })
+    };
+    answer.not_identifiable = (0..finding.unknowns.len()).filter_map(open).collect();
+    let motion = if material.cell.robot.is_some() { "stroke" } else { "toss" };
+    let more = finding.fit.clips.iter().zip(&answer.clips.train);
+    let more = more.map(|(clip, file)| (format!("one more {motion} like {file}"), clip.information.clone()));
+    answer.advice = finding.advice(|k| finding.intervals.half_width[k] / range(finding, k), more);
+    answer
+}
 
-    /// The answer but for figures.
-    pub(super) fn answer(&self, material: &Material) -> Identification {
-        let bounded = self.unknowns.iter().zip(&self.held).filter(|(_, held)| **held);
-        let clips = material.used.clips.clone();
-        let mut warnings = material.warnings();
-        for (file, weight) in clips.train.iter().zip(&self.found.at.weights).filter(|(_, w)| **w < FULL_WEIGHT) {
-            warnings.push(format!("{file} fits worse than the others and counts {:.0} %", weight * 100.0));
-        }
-        if (0..self.unknowns.len()).all(|k| !self.shows(k)) {
-            warnings.push(
-                "nothing in these clips depends on any of the numbers: all of them stay where the search began; record \
-                 clips in which the object is hit and slides"
-                    .into(),
-            );
-        }
-        Identification {
-            target: "object".into(),
-            parameters: self.parameters(),
-            not_identifiable: self.untold(material),
-            evaluations: self.found.evaluations,
-            converged: self.found.converged,
-            at_bounds: bounded.map(|(unknown, _)| unknown.name.clone()).collect(),
-            names: self.unknowns.iter().map(|unknown| unknown.name.clone()).collect(),
-            correlation: self.intervals.correlation.row_iter().map(|row| row.iter().copied().collect()).collect(),
-            convergence: self.found.convergence.clone(),
-            witnesses: self.intervals.witnesses,
-            misfit: self.fit.misfit().sqrt(),
-            advice: self.advice(&clips.train, if material.cell.robot.is_some() { "stroke" } else { "toss" }),
-            clips,
-            warnings,
-            ..Identification::default()
-        }
-    }
+/// Width of a number's search.
+fn range(finding: &Finding<'_>, k: usize) -> f64 {
+    finding.unknowns[k].upper - finding.unknowns[k].lower
+}
 
-    fn parameters(&self) -> BTreeMap<String, Parameter> {
-        let mut parameters = BTreeMap::<String, Parameter>::new();
-        for (k, setting) in self.settings.settings().iter().enumerate() {
-            let (value, half) = (self.fit.shared[k], self.intervals.half_width[k]);
-            let parameter = parameters.entry(setting.parameter()).or_default();
-            parameter.unit = setting.physical_unit();
-            parameter.single = !matches!(setting, Setting::CentreOfMass(_));
-            parameter.value.push(value);
-            parameter.start.push(self.unknowns[k].start);
-            parameter.ci95.push([value - half, value + half]);
-        }
-        parameters
-    }
+/// Whether the clips would tell one end of a number's range from the other.
+fn shows(finding: &Finding<'_>, k: usize) -> bool {
+    finding.fit.information()[(k, k)] * range(finding, k).powi(2) >= 1.0
+}
 
-    fn untold(&self, material: &Material) -> Vec<NotIdentifiable> {
-        let untold =
-            |k: usize| Some(NotIdentifiable { parameter: self.unknowns[k].name.clone(), why: self.why(k, material)? });
-        (0..self.unknowns.len()).filter_map(untold).collect()
+fn why(finding: &Finding<'_>, k: usize, material: &Material) -> Option<String> {
+    let setting = &finding.settings[k];
+    let (value, half) = (finding.fit.shared[k], finding.intervals.half_width[k]);
+    let remedy = remedy(setting, material);
+    if finding.held[k] {
+        let end = finding.nearer_bound(k);
+        let or = if material.cell.robot.is_some() { ", or ask `calibration diagnose` what else acts" } else { "" };
+        return Some(format!(
+            "the best value lies at or beyond {value:.4}, the {end} bound of its range in cell.toml: widen the range{or}"
+        ));
     }
-
-    fn why(&self, k: usize, material: &Material) -> Option<String> {
-        let (setting, unknown) = (&self.settings.settings()[k], &self.unknowns[k]);
-        let (value, half) = (self.fit.shared[k], self.intervals.half_width[k]);
-        let remedy = remedy(setting, material);
-        if self.held[k] {
-            let end = if value - unknown.lower < unknown.upper - value { "lower" } else { "upper" };
-            let or = if material.cell.robot.is_some() { ", or ask `calibration diagnose` what else acts" } else { "" };
-            return Some(format!(
-                "the best value lies at or beyond {value:.4}, the {end} bound of its range in cell.toml: widen the range{or}"
-            ));
-        }
-        if !self.shows(k) {
-            return Some(format!("nothing in these clips depends on it; {remedy}"));
-        }
-        let relative = matches!(setting, Setting::Friction | Setting::Mass) && half > VALUE_SHARE * value;
-        if !relative && half <= RANGE_SHARE * (unknown.upper - unknown.lower) {
-            return None;
-        }
-        let together = self
-            .partner(k)
-            .map_or_else(String::new, |(name, r)| format!(" it moves together with {name} (correlation {r:.2});"));
-        let unit = setting.physical_unit();
-        let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-        Some(format!("its 95 % interval is as wide as ±{half:.3}{unit};{together} {remedy}"))
+    if !shows(finding, k) {
+        return Some(format!("nothing in these clips depends on it; {remedy}"));
     }
-
-    /// Whether the clips would tell one end of a number's range from the other.
-    fn shows(&self, k: usize) -> bool {
-        let unknown = &self.unknowns[k];
-        self.fit.information()[(k, k)] * (unknown.upper - unknown.lower).powi(2) >= 1.0
+    let relative = matches!(setting, Setting::Friction | Setting::Mass) && half > OPEN_FROM_SHARE_OF_VALUE * value;
+    if !relative && half <= OPEN_FROM_SHARE_OF_RANGE * range(finding, k) {
+        return None;
     }
-
-    /// The number that this one moves together with most closely, and their correlation.
-    fn partner(&self, k: usize) -> Option<(String, f64)> {
-        let row = self.intervals.correlation.row(k);
-        let (other, r) =
-            (0..row.len()).filter(|i| *i != k).map(|i| (i, row[i])).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-        (r.abs() > TOGETHER).then(|| (number_in_words(&self.unknowns[other].name), r))
-    }
-
-    /// Motions that sharpen the worst number most.
-    fn advice(&self, files: &[String], motion: &str) -> Vec<Advice> {
-        let half = &self.intervals.half_width;
-        let share = |k: usize| half[k] / (self.unknowns[k].upper - self.unknowns[k].lower);
-        let told = (0..half.len()).filter(|k| half[*k].is_finite() && !self.held[*k]);
-        let Some(worst) = told.max_by(|a, b| share(*a).total_cmp(&share(*b))) else { return Vec::new() };
-        let advice = |(clip, file): (&inference::estimate::ClipFit, &String)| Advice {
-            record: format!("one more {motion} like {file}"),
-            parameter: self.unknowns[worst].name.clone(),
-            now: half[worst],
-            predicted: self.intervals.with_more(&self.fit, &clip.information)[worst],
-        };
-        let mut all: Vec<Advice> = self.fit.clips.iter().zip(files).map(advice).collect();
-        all.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
-        all.truncate(PROPOSALS);
-        all
-    }
+    let together = finding
+        .partner(k)
+        .map_or_else(String::new, |(name, r)| format!(" it moves together with {name} (correlation {r:.2});"));
+    let unit = setting.physical_unit();
+    let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+    Some(format!("its 95 % interval is as wide as ±{half:.3}{unit};{together} {remedy}"))
 }
 
 /// What would tell a number.

@@ -11,7 +11,7 @@
 //! | `parts` | how sure tosses leave the numbers |
 //! | `polish` | the last stretch to that loss |
 //! | `vicinity` | the way down to it by few points |
-//! | `finding` | what a fit tells, number by number, and what it cannot tell |
+//! | `finding` | what a fit says, number by number, and what it cannot say |
 //! | `doubt` | what speaks against trusting the fit |
 //! | [`compare`] | ways of searching side by side |
 //! | `figures` | how far the twin is off |
@@ -28,9 +28,9 @@ mod polish;
 mod step;
 mod vicinity;
 
+pub use super::options::Options;
 use super::run::{Optimizer, Outcome, Run, RunError, concluded};
 use crate::answer::identification::Identification;
-use finding::Finding;
 use fit::{ObjectFit, fit_object, linearise_object};
 use inference::engine::{Engine, EngineError, Used};
 use inference::estimate::Impossible;
@@ -53,36 +53,12 @@ use shared_mem::progress::Progress;
 use shared_mem::recording::{Clip, ReadError, SessionFiles};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file::{self, TomlFileError};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 use twin::arm::ModelError;
 use twin::replay::ReplayError;
 use twin::scene::{MeshFileError, ObjectModel, ObjectShape};
 use twin::sim::SimError;
-
-/// What to identify, and how.
-#[derive(Debug, Clone, Default)]
-pub struct Options {
-    /// The session's folder, or a clip beside a cell.toml.
-    pub session: PathBuf,
-    /// The cell.toml, where it does not lie beside the clips.
-    pub cell: Option<PathBuf>,
-    /// Of several objects in cell.toml the one to identify; the one that moves where none is named.
-    pub object: Option<String>,
-    /// The way of searching.
-    pub optimizer: Optimizer,
-    /// Where the parameters go.
-    pub out: Option<PathBuf>,
-    /// Parameters that are known already: gains, which are then not searched, effects.
-    pub parameters: Option<PathBuf>,
-    /// Points whose cost a search without slopes may ask for.
-    pub budget: usize,
-    /// Draws the clips that are held out, and the searches.
-    pub seed: u64,
-    /// Another program that simulates arm and object in place of the twin.
-    pub engine: Option<Arc<Engine>>,
-}
 
 /// The object cannot be identified.
 #[derive(Debug, thiserror::Error)]
@@ -182,9 +158,9 @@ fn identify_kept(
     let found = problem.search(&mut clips, options, (kept, interrupt))?;
     let searched = (&problem.settings, &problem.unknowns[..]);
     let disagreement = disagreement(&found.at.shared, &clips, searched, (kept, interrupt))?;
-    let finding = Finding::new(searched, &found, disagreement.as_deref().unwrap_or_default());
+    let finding = finding::finding(searched, &found, disagreement.as_deref().unwrap_or_default());
     let theta = problem.settings.theta(&found.at.shared);
-    let mut answer = finding.answer(material);
+    let mut answer = finding::answer(&finding, &found.at.weights, material);
     answer.session = options.session.display().to_string();
     answer.files = SessionFiles { session: options.session.clone(), cell: options.cell.clone() };
     answer.object = material.cell.one_of_several().map(str::to_owned);

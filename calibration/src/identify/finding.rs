@@ -1,0 +1,185 @@
+//! A fit number by number, for every identification alike: values with their intervals, which numbers hang together, and what one
+//! more recording would bring.
+
+use crate::answer::identification::{Advice, Identification, Parameter};
+use crate::words::number_in_words;
+use inference::estimate::{Fit, Intervals, Unknown};
+use inference::forward::Setting;
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+/// Correlation of two estimates from which on they are said to move together (a choice).
+const MOVE_TOGETHER: f64 = 0.9;
+/// Recordings that are proposed (a choice).
+const PROPOSALS: usize = 3;
+
+/// A fit with all that it says.
+pub(super) struct Finding<'a> {
+    pub(super) settings: &'a [Setting],
+    pub(super) unknowns: &'a [Unknown],
+    pub(super) fit: Fit,
+    /// Numbers that were not free at the end.
+    pub(super) held: Vec<bool>,
+    pub(super) intervals: Intervals,
+    /// Clips simulated.
+    pub(super) simulated: usize,
+    /// Clips simulated so far, and the loss then.
+    pub(super) convergence: Vec<[f64; 2]>,
+    /// Whether the search came to its end.
+    pub(super) arrived: bool,
+}
+
+impl Finding<'_> {
+    /// The part of an answer that the fit alone says; `before`: the numbers that were known.
+    pub(super) fn answer(&self, target: &str, before: &[f64]) -> Identification {
+        let at_bound =
+            |(unknown, held): (&Unknown, &bool)| (*held && unknown.upper > unknown.lower).then(|| unknown.name.clone());
+        Identification {
+            target: target.into(),
+            parameters: self.parameters(before),
+            evaluations: self.simulated,
+            converged: self.arrived,
+            at_bounds: self.unknowns.iter().zip(&self.held).filter_map(at_bound).collect(),
+            names: self.unknowns.iter().map(|unknown| unknown.name.clone()).collect(),
+            correlation: rows(&self.intervals.correlation),
+            convergence: self.convergence.clone(),
+            witnesses: self.intervals.witnesses,
+            misfit: self.fit.misfit().sqrt(),
+            ..Identification::default()
+        }
+    }
+
+    /// Numbers of one parameter together, in its own unit.
+    fn parameters(&self, before: &[f64]) -> BTreeMap<String, Parameter> {
+        let mut parameters = BTreeMap::<String, Parameter>::new();
+        for (k, setting) in self.settings.iter().enumerate() {
+            let (value, half) = (self.fit.shared[k], self.intervals.half_width[k]);
+            let ends = [value - half, value + half].map(|end| setting.physical(end));
+            let ends = if half.is_finite() { ends } else { [f64::NEG_INFINITY, f64::INFINITY] };
+            let parameter = parameters.entry(setting.parameter()).or_default();
+            parameter.unit = setting.physical_unit();
+            parameter.single = matches!(setting, Setting::Friction | Setting::Mass | Setting::TipFriction);
+            parameter.value.push(setting.physical(value));
+            parameter.start.push(setting.physical(before[k]));
+            parameter.ci95.push([ends[0].min(ends[1]), ends[0].max(ends[1])]);
+        }
+        parameters
+    }
+
+    /// The bound of its search that a number is nearer to, in words.
+    pub(super) fn nearer_bound(&self, k: usize) -> &'static str {
+        let (unknown, value) = (&self.unknowns[k], self.fit.shared[k]);
+        if value - unknown.lower < unknown.upper - value { "lower" } else { "upper" }
+    }
+
+    /// The number that one moves together with most closely, and their correlation; `None` where none does closely.
+    pub(super) fn partner(&self, k: usize) -> Option<(String, f64)> {
+        let row = self.intervals.correlation.row(k);
+        let others = (0..row.len()).filter(|other| *other != k).map(|other| (other, row[other]));
+        let (other, r) = others.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        (r.abs() > MOVE_TOGETHER).then(|| (number_in_words(&self.unknowns[other].name), r))
+    }
+
+    /// What to record next, best first: what most sharpens the number whose interval is widest by `width`. `more`: what may be
+    /// recorded, and the information that it adds.
+    pub(super) fn advice(
+        &self,
+        width: impl Fn(usize) -> f64,
+        more: impl IntoIterator<Item = (String, DMatrix<f64>)>,
+    ) -> Vec<Advice> {
+        let half = &self.intervals.half_width;
+        let known = (0..half.len()).filter(|k| half[*k].is_finite());
+        let Some(worst) = known.max_by(|a, b| width(*a).total_cmp(&width(*b))) else { return Vec::new() };
+        let advice = |(record, information): (String, DMatrix<f64>)| Advice {
+            record,
+            parameter: self.unknowns[worst].name.clone(),
+            now: half[worst],
+            predicted: self.intervals.with_more(&self.fit, &information)[worst],
+        };
+        let mut all: Vec<Advice> = more.into_iter().map(advice).collect();
+        all.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+        all.truncate(PROPOSALS);
+        all
+    }
+}
+
+/// Rows of a matrix, as an answer holds them.
+pub(super) fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use inference::estimate::{ClipModel, Impossible, Options, at_bounds, fit};
+
+    /// Measurements of `x + share * y` and of `x` at a few places.
+    struct Line {
+        share: f64,
+    }
+
+    impl ClipModel for Line {
+        fn clips(&self) -> usize {
+            2
+        }
+
+        fn residuals(&self, clip: usize, shared: &[f64], _: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+            let [x, y] = [shared[0], shared[1]];
+            let noise = |row: u32| 0.3 * f64::from(row * 7 % 5) - 0.6;
+            out.clear();
+            out.extend((0..20).map(|row| {
+                let factor = if clip == 0 { self.share } else { self.share + 0.05 };
+                10.0 * (x + factor * y - 0.5 - 0.25 * factor) + noise(row)
+            }));
+            Ok(())
+        }
+    }
+
+    fn found(share: f64, asked: impl FnOnce(&Finding<'_>)) {
+        let unknown = |name: &str| Unknown { name: name.into(), start: 0.4, lower: -5.0, upper: 5.0, step: 1e-3 };
+        let unknowns = [unknown("friction"), unknown("mass")];
+        let fit = fit(&Line { share }, &unknowns, &[], &Options::default(), |_, _| true).expect("an answer");
+        let held = at_bounds(&unknowns, &fit.shared);
+        let intervals = Intervals::new(&fit, &held);
+        let settings = [Setting::Friction, Setting::Mass];
+        asked(&Finding {
+            settings: &settings,
+            unknowns: &unknowns,
+            fit,
+            held,
+            intervals,
+            simulated: 8,
+            convergence: Vec::new(),
+            arrived: true,
+        });
+    }
+
+    #[test]
+    fn a_finding_says_values_intervals_and_where_the_search_began() {
+        found(1.0, |finding| {
+            let answer = finding.answer("object", &[0.4, 0.3]);
+            let friction = &answer.parameters["friction"];
+            assert!(friction.single && friction.start == [0.4] && answer.parameters["mass"].start == [0.3]);
+            assert!((friction.ci95[0][0]..friction.ci95[0][1]).contains(&friction.value[0]));
+            assert_eq!((answer.names.len(), answer.correlation.len(), answer.at_bounds.len()), (2, 2, 0));
+            assert!((answer.correlation[0][1] - answer.correlation[1][0]).abs() < 1e-9);
+        });
+    }
+
+    #[test]
+    fn numbers_that_move_together_are_named_and_more_information_narrows_the_widest_interval() {
+        found(1.0, |finding| {
+            let (name, r) = finding.partner(0).expect("two sums that are nearly one");
+            assert!(name == "mass" && r < -MOVE_TOGETHER, "{name} {r}");
+            let more = |times: f64| (format!("{times}"), finding.fit.information() * times);
+            let advice =
+                finding.advice(|k| finding.intervals.half_width[k], [more(1.0), more(4.0), more(2.0), more(3.0)]);
+            let order: Vec<&str> = advice.iter().map(|advice| advice.record.as_str()).collect();
+            assert_eq!(order, ["4", "3", "2"]);
+            assert!(
+                advice.iter().all(|advice| advice.predicted < advice.now && advice.parameter == "mass"),
+                "{advice:?}"
+            );
+        });
+    }
+}
