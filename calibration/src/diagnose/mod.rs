@@ -40,6 +40,7 @@ pub use crate::answer::diagnosis::{
 };
 
 use crate::identify::arm::{self, ArmError};
+use conclude::case::Case;
 use fit::bench::Bench;
 use ground::Ground;
 use inference::admit::{Admitted, Refused, admit, torques};
@@ -148,7 +149,7 @@ pub fn diagnose_kept(
         Err(Refused::NotTestable(why)) => {
             // A cell that cannot be simulated is an error all the same.
             setting::complete(&session.cell, options.theta.as_ref())?;
-            return Ok((conclude::conclusion::not_testable(session, options, &why), Arc::new(Kept::default())));
+            return Ok((conclude::not_testable(session, options, &why), Arc::new(Kept::default())));
         }
         admitted => admitted?,
     };
@@ -279,7 +280,8 @@ fn examine<E: Evidence>(
     let found = search::combine::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
     let cut_short = interrupt.spent();
     bar.stage(fit::stages::CONCLUSION, 1);
-    let mut concluded = conclude::conclusion::conclude(&bench, &split, &found, session, admitted, options)?;
+    let case = Case { bench: &bench, split: &split, found: &found, session, admitted, options };
+    let mut concluded = conclude::conclude(&case)?;
     let baseline = library.theta(&found.steps[0].from.full);
     // What the twin makes of the recorded motion says nothing about another program.
     if options.engine.is_none() {

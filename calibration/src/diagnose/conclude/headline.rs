@@ -8,19 +8,32 @@ use crate::words::{percent, words};
 
 /// What the sentence is made of, beside the finding itself.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Facts {
+pub(super) struct Facts {
     /// How large the gap is: `2.13 mrad RMS`.
-    pub size: String,
+    pub(super) size: String,
     /// Where it is largest: `joint 2 (reversal)`; empty where it is nowhere.
-    pub place: String,
+    pub(super) place: String,
     /// Where it is largest once the effects are in the twin.
-    pub rest: String,
+    pub(super) rest: String,
     /// The effects found, each with its size: `command delay (delay 11.9 ms)`.
-    pub effects: Vec<String>,
-    /// An effect with its size, the share of the gap that it closes, and how many clips do not prove it and how many more would.
-    pub unproven: Option<(String, f64, [usize; 2])>,
+    pub(super) effects: Vec<String>,
+    /// An effect that is likely and not proven.
+    pub(super) unproven: Option<NotProven>,
     /// The shrink with all of them in the twin.
-    pub shrink: Shrunk,
+    pub(super) shrink: Shrunk,
+}
+
+/// An effect that closes a part of the gap, in too few clips to be proven.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NotProven {
+    /// With its size.
+    pub(super) effect: String,
+    /// Share of the gap that it closes.
+    pub(super) share: f64,
+    /// How many clips do not prove it.
+    pub(super) clips: usize,
+    /// How many more would.
+    pub(super) more: usize,
 }
 
 impl Shrunk {
@@ -38,9 +51,9 @@ impl Shrunk {
 }
 
 /// Residuals beyond this multiple of the noise are said, even where they are no gap.
-const ROUGH: f64 = 1.25;
+const SAID_FROM: f64 = 1.25;
 
-pub fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
+pub(super) fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
     match decision.kind {
         Kind::None => none(finding, facts),
         Kind::Named => named(finding, facts),
@@ -51,12 +64,12 @@ pub fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> St
 
 fn none(finding: &Finding<'_>, Facts { size, .. }: &Facts) -> String {
     let times = finding.times_noise();
-    if finding.within_tolerance[0] && times >= ROUGH {
+    if finding.within_tolerance[0] && times >= SAID_FROM {
         return format!(
             "No gap of interest: with the parameters identified, twin and cell differ by {size}, less than the tolerance."
         );
     }
-    if times < ROUGH {
+    if times < SAID_FROM {
         return format!(
             "No gap: with the parameters identified, twin and cell differ by {size}, as noise alone makes them."
         );
@@ -86,7 +99,7 @@ fn named(finding: &Finding<'_>, facts: &Facts) -> String {
 
 /// The sentence where what was found is proven, but a part of the gap stays. `share`: what it explains, and whether it is stronger
 /// than what is met in practice; `after`: how large what stays is; `rivals`: effects that do as well as one of those found.
-pub fn in_part(
+pub(super) fn in_part(
     facts: &Facts,
     (share, unusual): (&Share, bool),
     (after, looks_like): (&str, Option<&str>),
@@ -134,7 +147,7 @@ fn class(finding: &Finding<'_>, facts: &Facts) -> String {
 
 fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
     let nearest = if facts.effects.is_empty() {
-        let unproven = |(effect, share, [clips, more]): &(String, f64, [usize; 2])| {
+        let unproven = |NotProven { effect, share, clips, more }: &NotProven| {
             let share = percent(*share);
             format!(
                 "; {effect} closes {share} of it, but in {clips} clips that may be chance: about {more} more would prove it"
@@ -256,7 +269,8 @@ mod tests {
         assert!(text.contains("payload (mass 0.4 kg) comes nearest but shrinks it by 96 %"), "{text}");
         let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 6.5) };
         assert!(said(&pushed, &["payload"]).contains("stronger than it is met in practice"));
-        let open = Facts { unproven: Some(("payload (mass 0.4 kg)".into(), 0.63, [4, 5])), ..facts(&[]) };
+        let unproven = NotProven { effect: "payload (mass 0.4 kg)".into(), share: 0.63, clips: 4, more: 5 };
+        let open = Facts { unproven: Some(unproven), ..facts(&[]) };
         let found = finding(vec![], 500.0, 500.0);
         let text = sentence(&found.decide(), &found, &open);
         assert!(

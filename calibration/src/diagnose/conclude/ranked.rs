@@ -1,8 +1,10 @@
 //! What is said of every candidate: how likely it is, how much it shrinks the gap, and what became of it. `reason.rs`
 //! says why.
 
+use super::case::Case;
+use super::decide::Decided;
+use super::measure::Measures;
 use super::reason::{Judged, reason};
-use super::verdict::Finding;
 use crate::answer::diagnosis::{Candidate, Share, Status};
 use crate::diagnose::Kind;
 
@@ -15,7 +17,6 @@ use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::judge::{confidence, held_out};
 use crate::diagnose::propose::screening;
 use inference::likelihood::Evidence;
-use inference::admit::Split;
 
 /// What nobody fitted closes nothing.
 const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
@@ -23,14 +24,15 @@ const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
 const FLOWN: Share = Share { value: DOUBLED, ci90: [DOUBLED; 2] };
 
 /// What is said of every candidate: what was named first, then what is possible, then the likelier.
-pub(in crate::diagnose) fn candidates<E: Evidence>(
-    bench: &Bench<'_, E>,
-    (found, overdispersion): (&Found, f64),
-    split: &Split,
-    (before, after, finding): (&Residuals, &Residuals, &Finding<'_>),
+pub(super) fn candidates<E: Evidence>(
+    case: &Case<'_, E>,
+    measures: &Measures,
+    decided: &Decided<'_>,
     kind: Kind,
-    seed: u64,
 ) -> Vec<Candidate> {
+    let Case { bench, split, .. } = *case;
+    let (found, finding, seed) = (decided.found(case), &decided.finding, case.options.seed);
+    let (before, after) = (&measures.without.left, decided.after(measures));
     let first = &found.steps[0];
     let last_weights = &found.steps.last().unwrap_or(first).weights;
     let time_step =
@@ -71,7 +73,7 @@ pub(in crate::diagnose) fn candidates<E: Evidence>(
                 .map(|fit| parameters::of_effect_moved(bench, fit, effect, if kept { &time_step } else { &[] }))
                 .unwrap_or_default(),
             shrink,
-            confusable_with: confusable(first, effect, overdispersion, bench),
+            confusable_with: confusable(first, effect, measures.overdispersion[0], bench),
             status,
             why: format!("{}{}", reason(bench, found, &judged), carried_over(&shrink)),
         }
@@ -199,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_fit_some_clips_alone_are_told() {
+    fn numbers_that_fit_some_clips_alone_are_named() {
         assert!(carried_over(&FLOWN).contains("more than doubles"));
         assert_eq!(carried_over(&Share { value: -0.4, ci90: [-0.6, 0.1] }), "");
         assert_eq!(carried_over(&NOT_FITTED), "");

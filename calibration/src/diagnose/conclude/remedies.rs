@@ -6,7 +6,7 @@ use shared_mem::theta::Theta;
 use twin::effects::find;
 
 /// A remedy for each effect that the verdict names, with its numbers of `theta`; none where it names none for sure.
-pub fn of(verdict: &Verdict, theta: &Theta, cell: &Cell) -> Vec<Remedy> {
+pub(super) fn of(verdict: &Verdict, theta: &Theta, cell: &Cell) -> Vec<Remedy> {
     if verdict.kind != Kind::Named {
         return Vec::new();
     }

@@ -8,45 +8,45 @@ use std::time::Duration;
 
 /// What a verdict is drawn from.
 #[derive(Debug, Clone)]
-pub struct Finding<'a> {
+pub(super) struct Finding<'a> {
     /// Effects that were found, in the order in which they were.
-    pub effects: Vec<&'a str>,
+    pub(super) effects: Vec<&'a str>,
     /// Effects that would do as well as one of them.
-    pub rivals: Vec<&'a str>,
+    pub(super) rivals: Vec<&'a str>,
     /// How sure the weakest of them is.
-    pub confidence: f64,
+    pub(super) confidence: f64,
     /// Whether each of them stood out: nearly all clips spoke for it, and for no other.
-    pub clear: bool,
+    pub(super) clear: bool,
     /// Whether all of them act on the arm.
-    pub of_arm: bool,
+    pub(super) of_arm: bool,
     /// The gap before and after, of every group of sensors.
-    pub left: Vec<Left>,
+    pub(super) left: Vec<Left>,
     /// Whether the gap shrinks on the clips that were kept for confirming.
-    pub confirmed: bool,
+    pub(super) confirmed: bool,
     /// Whether an effect is stronger than what is met in practice.
-    pub implausible: bool,
+    pub(super) implausible: bool,
     /// Whether the gap is of no interest without effects, and with them.
-    pub within_tolerance: [bool; 2],
+    pub(super) within_tolerance: [bool; 2],
     /// How much the friction of the last clip is over that of the first, less 1, where it drifts over the session.
-    pub drift: Option<f64>,
+    pub(super) drift: Option<f64>,
 }
 
 /// The verdict without its sentence.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Decision {
+pub(super) struct Decision {
     /// Which of the five it is.
-    pub kind: Kind,
+    pub(super) kind: Kind,
     /// Effects named, or the members of the class.
-    pub effects: Vec<String>,
+    pub(super) effects: Vec<String>,
     /// How sure, 0 to 1.
-    pub confidence: f64,
+    pub(super) confidence: f64,
     /// Whether a gap that nothing explains is so small that an effect may be too weak to be identified in it.
-    pub little: bool,
+    pub(super) little: bool,
 }
 
 impl Decision {
     /// The verdict with its sentence.
-    pub fn said(self, text: String) -> Verdict {
+    pub(super) fn said(self, text: String) -> Verdict {
         let Self { kind, effects, confidence, .. } = self;
         Verdict { kind, effects, confidence, text, explained_share: None, rest: None }
     }
@@ -75,7 +75,7 @@ const ALL_BUT_EXACT: f64 = 99.5;
 const LIKELY: f64 = 0.5;
 
 impl Finding<'_> {
-    pub fn decide(&self) -> Decision {
+    pub(super) fn decide(&self) -> Decision {
         if self.within_tolerance[0] {
             return self.none();
         }
@@ -141,7 +141,7 @@ impl Finding<'_> {
 }
 
 /// The verdict when the clips do not say enough.
-pub fn not_testable(why: &str) -> Verdict {
+pub(super) fn not_testable(why: &str) -> Verdict {
     let decision = Decision { kind: Kind::NotTestable, effects: Vec::new(), confidence: 1.0, little: false };
     decision.said(format!("Not testable: {why}."))
 }

@@ -1,0 +1,129 @@
+//! From what was measured to the verdict: the finding is drawn from the search, and where nothing explains all of the gap, what is
+//! proven to explain a part of it.
+
+use super::case::Case;
+use super::measure::Measures;
+use super::verdict::{Decision, Finding};
+use crate::answer::diagnosis::Kind;
+use crate::diagnose::evidence::measured::Evidence;
+use crate::diagnose::fit::bench::Hypothesis;
+use crate::diagnose::judge::gap::Residuals;
+use crate::diagnose::judge::held_out::Fits;
+use crate::diagnose::judge::partly::{self, Partly};
+use crate::diagnose::judge::score::predict;
+use crate::diagnose::judge::trial::{Found, Step};
+use crate::diagnose::judge::{confidence, drift, remainder};
+use crate::diagnose::search::refit;
+
+/// The verdict, and what it rests on.
+pub(super) struct Decided<'a> {
+    pub(super) finding: Finding<'a>,
+    pub(super) decision: Decision,
+    /// Causes that are proven although a part of the gap stays.
+    pub(super) partly: Option<Partly>,
+}
+
+/// What an answer is about: effects that are believed, or the baseline.
+pub(super) struct Shown<'a> {
+    pub(super) hypothesis: &'a Hypothesis,
+    pub(super) fits: &'a Fits,
+    pub(super) left: &'a Residuals,
+}
+
+/// Draws the verdict.
+pub(super) fn decide<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Decided<'a> {
+    let finding = finding(case, measures);
+    let decision = finding.decide();
+    let unexplained = decision.kind == Kind::Unexplained;
+    let before = &measures.without.left;
+    let proven =
+        || partly::proven(case.bench, (case.split, case.found), before, &measures.overdispersion, case.options.seed);
+    let partly = if unexplained { proven() } else { None };
+    Decided { finding, decision, partly }
+}
+
+impl Decided<'_> {
+    /// Whether effects are believed.
+    fn believes(&self) -> bool {
+        self.partly.is_some() || matches!(self.decision.kind, Kind::Named | Kind::Class)
+    }
+
+    /// The search, as if it had ended with what is proven.
+    pub(super) fn found<'b, E>(&'b self, case: &'b Case<'_, E>) -> &'b Found {
+        self.partly.as_ref().map_or(case.found, |partly| &partly.found)
+    }
+
+    /// What the effects that were found leave, believed or not.
+    pub(super) fn after<'b>(&'b self, measures: &'b Measures) -> &'b Residuals {
+        self.partly.as_ref().map_or(&measures.with.left, |partly| &partly.after)
+    }
+
+    pub(super) fn shown<'b, E: Evidence>(&'b self, case: &'b Case<'_, E>, measures: &'b Measures) -> Shown<'b> {
+        let Measures { without, with, .. } = measures;
+        match &self.partly {
+            Some(Partly { found, fits, after, .. }) => Shown { hypothesis: &found.last, fits, left: after },
+            None if self.believes() => Shown { hypothesis: &case.found.last, fits: &with.fits, left: &with.left },
+            None => Shown { hypothesis: &case.first().from, fits: &without.fits, left: &without.left },
+        }
+    }
+
+    /// Whether effects come near to explaining a gap that nothing explains.
+    pub(super) fn comes_near(&self) -> bool {
+        let unexplained = self.decision.kind == Kind::Unexplained && self.partly.is_none();
+        unexplained && self.finding.confirmed && !self.finding.effects.is_empty()
+    }
+}
+
+fn finding<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Finding<'a> {
+    let Case { bench, found, .. } = *case;
+    let mut rivals = Vec::new();
+    let mut clear = true;
+    for (place, effect) in found.kept() {
+        let step = &found.steps[place];
+        clear &= step.is_clear(bench.library, effect);
+        let others = confidence::rivals(step, bench.library, effect, measures.overdispersion[place]);
+        let others = others.into_iter().filter(|other| !found.last.effects.contains(other));
+        rivals.extend(others.filter(|other| stands_in(case, step, effect, *other)).map(|other| case.name(other)));
+    }
+    Finding {
+        effects: found.last.effects.iter().map(|effect| case.name(*effect)).collect(),
+        rivals,
+        confidence: sureness(found),
+        clear,
+        of_arm: found.last.effects.iter().all(|effect| bench.library.candidates[*effect].is_of_arm()),
+        left: measures.left.clone(),
+        confirmed: measures.confirmation.holds,
+        implausible: !remainder::implausible(bench, &found.last).is_empty(),
+        within_tolerance: measures.within_tolerance,
+        drift: drift::of_friction(&bench.scatter, &found.last),
+    }
+}
+
+/// How sure the weakest of the effects that were found is.
+pub(super) fn sureness(found: &Found) -> f64 {
+    let of = |(place, effect): (usize, usize)| {
+        let all = confidence::probabilities(&found.steps[place].trials, false);
+        all.iter().find(|(candidate, _)| *candidate == effect).map_or(0.5, |(_, p)| *p)
+    };
+    found.kept().map(of).fold(1.0, f64::min)
+}
+
+/// Whether a rival of an effect does as well in its place beside all the others that were found: where several act, what one
+/// of them left unexplained makes rivals of it look alike that are told apart once the others are there.
+fn stands_in<E: Evidence>(case: &Case<'_, E>, step: &Step, effect: usize, rival: usize) -> bool {
+    let Case { bench, split, found, .. } = *case;
+    let (last, weights) = (&found.last, &found.steps[found.steps.len() - 1].weights);
+    let fitted = step.trials.iter().find(|trial| trial.scored.candidate == rival);
+    let Some((fit, _)) = fitted.and_then(|trial| trial.fitted.as_ref()).filter(|_| last.effects.len() > 1) else {
+        return true;
+    };
+    let effects: Vec<usize> = last.effects.iter().map(|other| if *other == effect { rival } else { *other }).collect();
+    let mut full = last.full.clone();
+    bench.library.candidates[effect].numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
+    bench.library.candidates[rival].numbers.clone().for_each(|k| full[k] = fit.full[k]);
+    let swapped = bench.fit((&effects, full), &split.train, weights, Some(last), refit::last_pass(bench));
+    let predicted = |hypothesis| predict(bench, hypothesis, &split.choose, weights);
+    let Some((with, instead)) = predicted(last).zip(swapped.as_ref().and_then(predicted)) else { return true };
+    let advantage = with.over(&instead);
+    confidence::alike(advantage.nats, advantage.error, advantage.clips())
+}

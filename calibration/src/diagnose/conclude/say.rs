@@ -1,0 +1,285 @@
+//! The answer: the verdict in its sentence, what to do about it, what to record next, and all figures.
+
+use super::case::Case;
+use super::decide::{Decided, sureness};
+use super::headline::{self, Facts, NotProven};
+use super::measure::Measures;
+use super::site::{Advice, Site};
+use super::{advice, ranked, remedies, verdict};
+use crate::answer::Trace;
+use crate::answer::diagnosis::{Change, Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Rest, Share, Verdict};
+use crate::diagnose::criteria::CLASS_IS_RIGHT;
+use crate::diagnose::evidence::measured::{Evidence, Group};
+use crate::diagnose::judge::ends;
+use crate::diagnose::judge::gap::Residuals;
+use crate::diagnose::judge::held_out;
+use crate::diagnose::judge::localise::localise;
+use crate::diagnose::judge::partly::Partly;
+use crate::diagnose::judge::sizes::Sizes;
+use crate::diagnose::judge::unproven::{Unproven, unproven};
+use crate::diagnose::{DiagnoseError, Options};
+use crate::words::{channel_in_words, words};
+use inference::admit::{Admitted, COMMANDS_TO_CHOOSE_BY, Split};
+use shared_mem::recording::Session;
+use shared_mem::theta::Theta;
+
+/// What noise alone leaves: residuals are in sigmas of the sensors.
+const NOISE_FLOOR: f64 = 1.0;
+/// So many traces are shown (a choice).
+const SHOWN_TRACES: usize = 12;
+
+/// The answer where the clips do not say enough.
+pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosis {
+    let site = Site::of(session, options.report.as_deref());
+    let next = advice::lacking(why, &site);
+    // What was known before; nothing was found.
+    let theta = options.theta.clone().unwrap_or_default();
+    Diagnosis { theta, ..empty(session, options, &site, (verdict::not_testable(why), next)) }
+}
+
+/// An answer in which nothing was measured.
+fn empty(session: &Session, options: &Options, site: &Site, (verdict, next): (Verdict, Advice)) -> Diagnosis {
+    Diagnosis {
+        verdict,
+        gap: Gap {
+            unit: "sigma",
+            before: 0.0,
+            after: 0.0,
+            floor: NOISE_FLOOR,
+            shrink: Share { value: 0.0, ci90: [0.0; 2] },
+            explainable_fraction: 0.0,
+            joint_rms_rad: Change::default(),
+            torque_rms: None,
+            object_add_m: Change::default(),
+            object_add_s_m: Change::default(),
+            sensors: Vec::new(),
+        },
+        nearest: None,
+        stage_test: None,
+        places: Vec::new(),
+        candidates: Vec::new(),
+        next_experiment: next.sentence,
+        next_commands: next.commands,
+        next_motions: next.motions.into_iter().map(NextMotion::new).collect(),
+        remedies: Vec::new(),
+        clips: Clips::default(),
+        warnings: Vec::new(),
+        budget_spent: false,
+        engine: None,
+        seconds: 0.0,
+        object: session.cell.one_of_several().map(str::to_owned),
+        session: session.folder.display().to_string(),
+        origin: site.origin().to_owned(),
+        files: session.files.clone(),
+        seed: options.seed,
+        theta: Theta::default(),
+        theta_file: None,
+        traces: Vec::new(),
+    }
+}
+
+/// Says what was measured and decided.
+///
+/// # Errors
+/// [`DiagnoseError`] when a clip cannot be replayed.
+pub(super) fn say<E: Evidence>(
+    case: &Case<'_, E>,
+    measures: Measures,
+    decided: &Decided<'_>,
+) -> Result<Diagnosis, DiagnoseError> {
+    let Case { bench, session, admitted, options, .. } = *case;
+    let (before, after) = (&measures.without.left, decided.after(&measures));
+    let shown = decided.shown(case, &measures);
+    let fits_and_left = ([&measures.without.fits, shown.fits], [before, shown.left]);
+    let sizes = Sizes::of(bench, fits_and_left, session, admitted)?;
+    let open = not_proven(case, decided, before);
+    let (verdict, rest) = verdict_of(case, &measures, decided, (&sizes, open.as_ref()));
+    let site = Site::of(session, options.report.as_deref());
+    let next = match &open {
+        Some((open, _)) if verdict.kind == Kind::Unexplained => advice::proving(open.effect(bench), open.more, &site),
+        _ => next(&verdict, decided, rest.first(), &site),
+    };
+    let nearest = decided.comes_near().then(|| Nearest {
+        effects: decided.finding.effects.iter().map(|name| (*name).to_owned()).collect(),
+        shrink: after.shrink(before, options.seed),
+    });
+    let theta = bench.library.theta(&shown.hypothesis.full);
+    // Of an object that no clip shows nothing was found but what was given.
+    let known = if admitted.with_object { Some(&theta) } else { options.theta.as_ref() };
+    let object = known.and_then(|known| known.object.clone());
+    let traced = if nearest.is_some() { after } else { shown.left };
+    let remedies = remedies::of(&verdict, &theta, &session.cell);
+    let (gap, candidates) = (
+        sizes.gap(([before, shown.left], measures.sensors.clone()), options.seed),
+        ranked::candidates(case, &measures, decided, verdict.kind),
+    );
+    Ok(Diagnosis {
+        gap,
+        candidates,
+        remedies,
+        clips: clips(admitted, case.split),
+        warnings: warnings(case, &shown.hypothesis.full, &shown.hypothesis.effects),
+        theta: Theta { object, ..theta },
+        traces: traces(bench.evidence, [before, traced], admitted),
+        nearest,
+        places: measures.without.places,
+        ..empty(session, options, &site, (verdict, next))
+    })
+}
+
+/// The verdict in its sentence, and where what was found leaves most.
+fn verdict_of<E: Evidence>(
+    case: &Case<'_, E>,
+    measures: &Measures,
+    decided: &Decided<'_>,
+    (sizes, open): (&Sizes, Option<&(Unproven<'_>, f64)>),
+) -> (Verdict, Vec<Place>) {
+    let places = &measures.without.places;
+    let rest = match &decided.partly {
+        Some(partly) => localise(case.bench.evidence, &partly.after),
+        None => measures.with.places.clone(),
+    };
+    let of_object = places.first().is_some_and(|place| !place.channel.starts_with("joint"));
+    let [size, stays] = sizes.in_words(of_object);
+    let last = &decided.found(case).last;
+    let largest = |places: &[Place]| places.first().map_or_else(String::new, place_in_words);
+    let facts = Facts {
+        size,
+        place: largest(places),
+        rest: largest(&rest),
+        effects: last.effects.iter().map(|effect| case.with_size(last, *effect)).collect(),
+        unproven: open.map(|(open, share)| NotProven {
+            effect: case.with_size(open.fit, open.trial.scored.candidate),
+            share: *share,
+            clips: open.clips,
+            more: open.more,
+        }),
+        shrink: measures.confirmation.shrink,
+    };
+    let verdict = match &decided.partly {
+        Some(partly) => in_part(case, partly, &facts, (&stays, sizes)),
+        None => decided.decision.clone().said(headline::sentence(&decided.decision, &decided.finding, &facts)),
+    };
+    (verdict, rest)
+}
+
+/// An effect that is likely and not proven, and how far the gap shrinks with it; `None` where it widens: that is no lead.
+fn not_proven<'a, E: Evidence>(
+    case: &'a Case<'_, E>,
+    decided: &'a Decided<'_>,
+    before: &Residuals,
+) -> Option<(Unproven<'a>, f64)> {
+    let open = unproven(case.bench, decided.found(case), case.admitted.cut())?;
+    let left = held_out::residuals(case.bench, case.split, (open.fit, &case.first().weights))?;
+    let share = left.shrink(before, case.options.seed).value;
+    (share > 0.0).then_some((open, share))
+}
+
+/// The files that are for what, each once.
+fn clips(admitted: &Admitted, split: &Split) -> Clips {
+    let files = |set: &[usize]| {
+        let mut files: Vec<String> = set.iter().map(|clip| admitted.files[*clip].clone()).collect();
+        files.dedup();
+        files
+    };
+    Clips { train: files(&split.train), choose: files(&split.choose), confirm: files(&split.confirm) }
+}
+
+/// What has to be known beside the answer: of the recording, of few commands, of effects as strong as they are looked for.
+fn warnings<E: Evidence>(case: &Case<'_, E>, full: &[f64], effects: &[usize]) -> Vec<String> {
+    let ended = effects.iter().filter(|effect| !ends::stopped(case.bench.library, **effect, full).is_empty());
+    let sentence = |effect: &usize| {
+        let name = words(case.name(*effect));
+        format!(
+            "{name} was found as strong as it is looked for: it may be stronger, or something else that looks like it"
+        )
+    };
+    case.admitted.warnings.iter().cloned().chain(few(case.admitted, case.split)).chain(ended.map(sentence)).collect()
+}
+
+/// What has to be known about clips of few commands.
+fn few(admitted: &Admitted, split: &Split) -> Option<String> {
+    let (commands, parts) = (admitted.commands, admitted.groups.len());
+    let [in_parts, in_turn] = match parts > commands {
+        true => [
+            format!("their clips count in {parts} parts, each of which is called a clip here, "),
+            format!("one in {} of them", split.in_turn.len()),
+        ],
+        false => [String::new(), "each".to_owned()],
+    };
+    (!split.in_turn.is_empty()).then(|| {
+        format!(
+            "only {commands} different commands: {in_parts}effects are chosen by all of them, and {in_turn} in turn is left out of the fit \
+             that its gap is measured with; record {} more to have clips that nothing was chosen by",
+            COMMANDS_TO_CHOOSE_BY - commands
+        )
+    })
+}
+
+/// The verdict where what was found is proven, but a part of the gap stays: so much of the joints [rad] and the object [m].
+fn in_part<E: Evidence>(case: &Case<'_, E>, partly: &Partly, facts: &Facts, (stays, sizes): (&str, &Sizes)) -> Verdict {
+    let looks_like = partly.looks_like(case.bench);
+    let [own, rivals] = partly.effects(case.bench);
+    let text = headline::in_part(facts, (&partly.share, partly.unusual), (stays, looks_like), &rivals);
+    let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
+    let (kind, confidence) =
+        if rivals.is_empty() { (Kind::Named, sureness(&partly.found)) } else { (Kind::Class, CLASS_IS_RIGHT.value) };
+    Verdict {
+        kind,
+        confidence,
+        effects: [own, rivals].concat(),
+        text,
+        explained_share: Some(partly.share),
+        rest: Some(Rest { joint_rms_rad: sizes.joints.after, object_add_m: sizes.add.after, place, looks_like }),
+    }
+}
+
+/// `joint 2 (reversal)`.
+fn place_in_words(place: &Place) -> String {
+    format!("{} ({})", channel_in_words(&place.channel), place.regime)
+}
+
+/// What to record next; `largest`: where what is left is largest.
+fn next(verdict: &Verdict, decided: &Decided<'_>, largest: Option<&Place>, site: &Site) -> Advice {
+    let largest = largest.map(|place| (place.channel.as_str(), place.regime.as_str()));
+    // A part of the gap is explained, or that of the arm alone.
+    let open = || decided.partly.is_some() || decided.finding.open().is_some();
+    match verdict.kind {
+        Kind::Unexplained => advice::unexplained(largest, site),
+        Kind::Named if open() => advice::unexplained(largest, site),
+        Kind::None => advice::nothing_open(site),
+        Kind::Named => advice::confirming(&verdict.effects, site),
+        Kind::Class | Kind::NotTestable => {
+            advice::separating(&verdict.effects.iter().map(String::as_str).collect::<Vec<_>>(), site)
+        }
+    }
+}
+
+/// Residuals of the channels with the largest gap, before and after, on the confirm clips.
+fn traces(evidence: &impl Evidence, [before, after]: [&Residuals; 2], admitted: &Admitted) -> Vec<Trace> {
+    let mut sized: Vec<(f64, usize, usize)> = Vec::new();
+    for (place, (clip, residuals)) in before.clips.iter().enumerate() {
+        for channel in 0..evidence.channels().len() {
+            let rows = evidence.rows(*clip).iter().zip(residuals).filter(|(row, _)| row.channel == channel);
+            sized.push((rows.map(|(_, r)| r * r).sum(), place, channel));
+        }
+    }
+    sized.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let trace = |(_, place, channel): (f64, usize, usize)| {
+        let (clip, info) = (before.clips[place].0, &evidence.channels()[channel]);
+        let points = |residuals: &[f64]| {
+            let rows = evidence.rows(clip).iter().zip(residuals).filter(|(row, _)| row.channel == channel);
+            rows.map(|(row, residual)| [row.time, *residual]).collect::<Vec<_>>()
+        };
+        let when = if info.group == Group::Contact { " in contact" } else { "" };
+        Trace {
+            clip: admitted.label(clip),
+            channel: format!("{} of {}{when}", info.quantity, channel_in_words(&info.place)),
+            unit: "σ".into(),
+            sigma: 1.0,
+            before: points(&before.clips[place].1),
+            after: points(&after.clips[place].1),
+        }
+    };
+    sized.into_iter().take(SHOWN_TRACES).map(trace).collect()
+}
