@@ -2,7 +2,7 @@
 
 use calibration::benchmark::session::record;
 use calibration::benchmark::world::{Fault, Kind, World};
-use calibration::identify::arm::controlled;
+use inference::controller::controlled;
 use inference::interrupt::Interrupt;
 use shared_mem::cell::{Cell, Ranges};
 use shared_mem::recording::Clip;

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`admit`] | which recorded clips can be used, and what each is for |
 //! | [`child_output`] | what other programs say on their pipes |
+//! | [`controller`] | what clips say of the controller before a model is fitted to them |
 //! | [`engine`] | another program that simulates the arm |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`interrupt`] | Ctrl-C, and a budget of time |
@@ -37,6 +38,7 @@
 
 pub mod admit;
 pub mod child_output;
+pub mod controller;
 pub mod engine;
 pub mod estimate;
 pub mod interrupt;

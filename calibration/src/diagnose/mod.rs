@@ -39,11 +39,11 @@ pub use crate::answer::diagnosis::{
     Sensors, Share, StageTest, Status, TorqueRms, Verdict,
 };
 
-use crate::identify::arm::{self, ArmError};
 use conclude::case::Case;
 use fit::bench::Bench;
 use ground::Ground;
 use inference::admit::{Admitted, Refused, admit, torques};
+use inference::controller::{self, ControllerError};
 use inference::engine::{Engine, EngineError, Quantity, Used};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept, Trail};
@@ -105,7 +105,7 @@ pub enum DiagnoseError {
     NoBaseline,
     /// The law that leads the arm cannot be found.
     #[error(transparent)]
-    Law(#[from] ArmError),
+    Law(#[from] ControllerError),
     /// The engine cannot be asked for these clips.
     #[error(transparent)]
     Engine(#[from] EngineError),
@@ -159,7 +159,7 @@ pub fn diagnose_kept(
     let session = alone.as_ref().unwrap_or(session);
     let mut admitted = admitted;
     let (known, remarks) = (options.theta.as_ref(), &mut admitted.warnings);
-    let cell = arm::controlled(session.cell.clone(), &admitted.clips, known, remarks, interrupt)?;
+    let cell = controller::controlled(session.cell.clone(), &admitted.clips, known, remarks, interrupt)?;
     let admitted = admitted.in_parts();
     let session = &Session { cell, ..session.clone() };
     let question = Fingerprint::of("diagnose")

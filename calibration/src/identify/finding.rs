@@ -4,7 +4,7 @@
 use crate::answer::identification::{Advice, Identification, Parameter};
 use crate::words::number_in_words;
 use inference::estimate::{Fit, Intervals, Unknown};
-use inference::forward::Setting;
+use inference::likelihood::Setting;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 

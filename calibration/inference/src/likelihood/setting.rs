@@ -59,6 +59,15 @@ impl Setting {
         parameter_of(name, parameter)
     }
 
+    /// The joint that it is about.
+    pub fn joint(&self) -> Option<usize> {
+        match self {
+            Self::Stiffness(joint) | Self::Damping(joint) => Some(*joint),
+            Self::Effect { index, .. } => *index,
+            _ => None,
+        }
+    }
+
     /// How a search comes by a number of an effect.
     pub fn search(&self) -> Option<Search> {
         self.of_effect().map(|parameter| parameter.search)

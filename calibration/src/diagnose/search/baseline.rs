@@ -10,9 +10,10 @@ use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::sweep::Precision;
 use crate::diagnose::fit::{floor, stages};
 use crate::diagnose::propose::arm_alone::ArmAlone;
-use crate::identify::{arm, object};
+use crate::identify::object;
 use inference::likelihood::{Evidence, Likelihood};
 use inference::admit::{Admitted, Split};
+use inference::controller;
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
@@ -71,7 +72,9 @@ fn of_the_arm<E: Likelihood>(
 fn start<E: Evidence>(bench: &Bench<'_, E>, split: &Split, cell: &Cell, admitted: &Admitted) -> Vec<f64> {
     let mut start = bench.library.start();
     let clips: Vec<&Clip> = split.train.iter().map(|clip| &admitted.clips[*clip]).collect();
-    let Ok(theta) = arm::begun(cell, &clips, &bench.library.theta(&start), bench.interrupt) else { return start };
+    let Ok(theta) = controller::begun(cell, &clips, &bench.library.theta(&start), bench.interrupt) else {
+        return start;
+    };
     let numbers = bench.library.settings.numbers(&theta);
     for k in bench.library.baseline.clone() {
         let unknown = &bench.library.unknowns[k];

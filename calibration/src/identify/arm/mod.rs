@@ -3,10 +3,7 @@
 //! | file | owns |
 //! |---|---|
 //! | `session` | which clips of a session can be used, and for what |
-//! | `law` | which control law leads the arm, where nobody says |
-//! | `measured_stiffness` | what logged torques say of the stiffness, where nobody does |
-//! | `start` | where the search begins when little is known |
-//! | `saturation` | the same for a limit of the torques |
+//! | `saturation` | where the search for a limit of the torques begins |
 //! | `time_step` | what the twin's time step does to the numbers, and that it is taken out |
 //! | `figures` | how far the twin is off |
 //! | `verdict` | what the clips cannot tell, and why; what to record next |
@@ -14,11 +11,8 @@
 
 mod doubt;
 mod figures;
-mod law;
-mod measured_stiffness;
 mod saturation;
 mod session;
-mod start;
 mod time_step;
 mod verdict;
 
@@ -27,8 +21,9 @@ pub use super::options::Options;
 use super::run::{Outcome, Run, RunError, concluded};
 use super::used::Used;
 use crate::answer::identification::Identification;
+use inference::controller::{ControllerError, controlled, start};
 use inference::engine;
-use inference::estimate::{ClipModel as _, Intervals, Random, Subset, Unknown, at_bounds};
+use inference::estimate::{Intervals, Random, Subset, Unknown, at_bounds};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept};
 use inference::likelihood::arm::ArmClips;
@@ -57,6 +52,9 @@ pub enum ArmError {
     /// The arm's model.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// What leads the arm.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
     /// There is nothing to identify.
     #[error("cell.toml has no {0} block; add it, or identify the object")]
     NoArm(&'static str),
@@ -201,51 +199,6 @@ fn identify_kept(
     let given = given.cloned().unwrap_or_default();
     let theta = Theta { object: given.object, others: given.others, ..settings.theta(&finding.fit.shared) };
     Ok((answer, theta))
-}
-
-/// The cell with what its clips say of the controller before anything is fitted to them: the law where it is not stated, and the
-/// stiffness where torques tell it. `given`: parameters that are known already; then gains are not looked for.
-///
-/// # Errors
-/// [`ArmError`] when the arm cannot be simulated under any law.
-pub fn controlled(
-    cell: Cell,
-    clips: &[Clip],
-    given: Option<&Theta>,
-    remarks: &mut Vec<String>,
-    interrupt: &Interrupt,
-) -> Result<Cell, ArmError> {
-    let mut cell = cell;
-    if let Some((led, remark)) = law::found(&cell, clips, given, interrupt)? {
-        cell = led;
-        remarks.push(remark);
-    }
-    if given.is_none_or(|given| given.arm.is_none())
-        && let Some((known, remark)) = measured_stiffness::found(&cell, clips)
-    {
-        cell = known;
-        remarks.push(remark);
-    }
-    Ok(cell)
-}
-
-/// Parameters from which a fit of gains by their slopes arrives: where cell.toml knows gains by range alone, the best of a coarse
-/// grid on the first few clips, joint by joint; elsewhere those given.
-///
-/// # Errors
-/// [`ArmError`] when the arm cannot be simulated at all.
-pub fn begun(cell: &Cell, clips: &[&Clip], base: &Theta, interrupt: &Interrupt) -> Result<Theta, ArmError> {
-    if !start::is_ranged(cell) {
-        return Ok(base.clone());
-    }
-    let clips = clips.iter().map(|clip| (*clip).clone()).collect();
-    let (settings, mut unknowns): (Vec<_>, Vec<_>) = arm_numbers(cell, base).into_iter().unzip();
-    let settings = Settings::new(base.clone(), settings);
-    let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
-    let (model, _) = ArmClips::means(cell, clips, numbers)?;
-    let all: Vec<usize> = (0..model.clips()).collect();
-    start::improve(cell, &model, &all, settings.settings(), &mut unknowns, interrupt);
-    Ok(settings.theta(&unknowns.iter().map(|unknown| unknown.start).collect::<Vec<_>>()))
 }
 
 /// Gains, and the parameters of the effects that were asked for.

@@ -2,14 +2,8 @@
 //! there; a limit that already clips some torque has one.
 
 use super::Model;
-use super::session::joint_of;
-use super::start::costs;
-use inference::estimate::ClipModel;
-use inference::estimate::Fit;
-use inference::estimate::Subset;
-use inference::estimate::Unknown;
-use inference::estimate::fit;
-use inference::estimate::Schedule;
+use inference::estimate::{ClipModel, Fit, Schedule, Subset, Unknown, fit};
+use inference::controller::start::costs;
 use inference::interrupt::Interrupt;
 use inference::likelihood::Setting;
 use rayon::prelude::*;
@@ -97,5 +91,5 @@ fn bring_near(
 
 /// The joint whose limit a number is.
 fn limited(setting: &Setting) -> Option<usize> {
-    joint_of(setting).filter(|_| setting.search() == Some(Search::Limit))
+    setting.joint().filter(|_| setting.search() == Some(Search::Limit))
 }

@@ -46,20 +46,11 @@ pub(super) fn used(
     Ok(Used::of(&all, left_out, seed))
 }
 
-/// The joint that a number is about.
-pub(super) fn joint_of(setting: &Setting) -> Option<usize> {
-    match setting {
-        Setting::Stiffness(joint) | Setting::Damping(joint) => Some(*joint),
-        Setting::Effect { index, .. } => *index,
-        _ => None,
-    }
-}
-
 /// Gains of joints that stand still in every clip to be fitted stay where they are.
 pub(super) fn hold_dead(model: &Model<'_>, train: &[usize], settings: &[Setting], unknowns: &mut [Unknown]) {
     for (setting, unknown) in settings.iter().zip(unknowns) {
         let gain = matches!(setting, Setting::Stiffness(_) | Setting::Damping(_));
-        let Some(joint) = joint_of(setting).filter(|_| gain) else { continue };
+        let Some(joint) = setting.joint().filter(|_| gain) else { continue };
         if train.iter().all(|clip| model.clip(*clip).stands_still(joint)) {
             (unknown.lower, unknown.upper) = (unknown.start, unknown.start);
         }

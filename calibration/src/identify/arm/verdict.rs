@@ -1,7 +1,6 @@
 //! What the clips cannot tell, and why, number by number; and what to record next.
 
 use super::Model;
-use super::session::joint_of;
 use crate::answer::identification::{Advice, NotIdentifiable};
 use crate::identify::finding::Finding;
 use crate::identify::run::Optimizer;
@@ -43,10 +42,10 @@ pub(super) fn not_identifiable(
 fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Option<String> {
     let (unknown, setting) = (&finding.unknowns[k], &finding.settings[k]);
     if unknown.lower >= unknown.upper {
-        let joint = joint_of(setting).map_or(0, |joint| joint + 1);
+        let joint = setting.joint().map_or(0, |joint| joint + 1);
         return Some(format!("joint {joint} follows its command in no clip: look at the joint, then record again"));
     }
-    let moves = match joint_of(setting) {
+    let moves = match setting.joint() {
         Some(joint) => format!("commands move joint {} by {:.3} rad", joint + 1, commanded(joint, model, clips)),
         None => "the clips move the arm too little or too slowly".into(),
     };

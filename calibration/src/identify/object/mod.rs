@@ -32,11 +32,9 @@ pub use super::options::Options;
 use super::run::{Optimizer, Outcome, Run, RunError, concluded};
 use crate::answer::identification::Identification;
 use fit::{ObjectFit, fit_object, linearise_object};
+use inference::controller::{self, ControllerError};
 use inference::engine::{Engine, EngineError, Used};
-use inference::estimate::Impossible;
-use inference::estimate::Unknown;
-use inference::estimate::fit as fit_clips;
-use inference::estimate::Schedule;
+use inference::estimate::{Impossible, Schedule, Unknown};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept};
 use inference::likelihood::arm::ArmClips;
@@ -73,6 +71,9 @@ pub enum ObjectError {
     /// The arm's model.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The gains.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
     /// The object's mesh.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
@@ -205,7 +206,11 @@ impl Problem {
             if !hits.is_empty() {
                 warnings.push("the arm's gains were found first, from the way to the object in the same clips".into());
                 let by = (&material.cell, options.engine.clone());
-                let find = || with_gains(by, &given, hits, interrupt);
+                let base = complete(&material.cell, Some(&given))?;
+                let find = || {
+                    let (found, _) = controller::fitted(by, &base, hits, interrupt)?;
+                    Ok::<_, ObjectError>(Theta { arm: found.arm, ..given.clone() })
+                };
                 // As text: what a person may read a number of effects in is no plain list of fields.
                 let text = kept.once_if_ok(&Fingerprint::of("gains"), || find().map(|theta| theta.to_toml()))?;
                 given = toml_file::parse::<Theta>(&text, std::path::Path::new("theta.toml"))?.about(&material.cell);
@@ -288,20 +293,4 @@ pub fn refine(
     let trail = (Kept::nothing(), "");
     let found = fit_object(&mut clips, &unknowns, &start, trail, |_, _| !interrupt.asked())?;
     Ok(settings.theta(&found.at.shared))
-}
-
-/// The gains that fit the arm's way to the object.
-fn with_gains(
-    (cell, engine): (&Cell, Option<Arc<Engine>>),
-    given: &Theta,
-    clips: Vec<Clip>,
-    interrupt: &Interrupt,
-) -> Result<Theta, ObjectError> {
-    let base = complete(cell, Some(given))?;
-    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = arm_numbers(cell, &base).into_iter().unzip();
-    let settings = Settings::new(base, settings);
-    let (clips, _) = ArmClips::means(cell, clips, |numbers: &[f64]| settings.theta(numbers))?;
-    let clips = clips.moved_by(engine, &complete(cell, None)?);
-    let fit = fit_clips(&clips, &unknowns, &clips.random(), &Schedule::default(), |_, _| !interrupt.asked())?;
-    Ok(Theta { arm: settings.theta(&fit.shared).arm, ..given.clone() })
 }

@@ -1,22 +1,23 @@
-//! Where the search begins when cell.toml tells gains only by wide ranges, or a delay is searched: least squares find the
+//! Where the search begins when cell.toml states gains only by wide ranges, or a delay is searched: least squares find the
 //! bottom of a valley, not the valley.
 
-use super::Model;
-use super::session::joint_of;
-use inference::estimate::{ClipModel as _, Unknown};
-use inference::interrupt::Interrupt;
 use inference::likelihood::{Likelihood as _, Setting};
+use crate::estimate::{ClipModel as _, Unknown};
+use crate::likelihood::Setting;
+use crate::likelihood::arm::{ArmClips, Row};
+use crate::interrupt::Interrupt;
 use rayon::prelude::*;
 use shared_mem::cell::Cell;
 use shared_mem::msg::{Joints, MAX_JOINTS};
+use shared_mem::theta::Theta;
 use twin::effects::Search;
 
-/// Gains are tried at these powers of two times where they begin.
-const POWERS: std::ops::RangeInclusive<i32> = -4..=4;
-/// Delays that are tried [s].
+/// Gains are tried at these powers of two times where they begin (a choice: ranges span two decades at most).
+const GAIN_POWERS: std::ops::RangeInclusive<i32> = -4..=4;
+/// Delays that are tried [s] (a choice).
 const DELAYS: [f64; 6] = [0.0, 0.005, 0.01, 0.02, 0.04, 0.08];
-/// So many clips tell where the valley is.
-const CLIPS: usize = 3;
+/// So many clips say where the valley is (a choice).
+const CLIPS_OF_THE_GRID: usize = 3;
 
 /// One place of the coarse grid: what was tried, and each joint's sum of squares there.
 struct Tried {
@@ -26,9 +27,9 @@ struct Tried {
 }
 
 /// Moves the starts of gains that are known by range alone, joint by joint, and of a delay, to the best of a coarse grid.
-pub(super) fn improve(
+pub fn improve<F: Fn(&[f64]) -> Theta + Sync>(
     cell: &Cell,
-    model: &Model<'_>,
+    model: &ArmClips<F>,
     train: &[usize],
     settings: &[Setting],
     unknowns: &mut [Unknown],
@@ -39,10 +40,10 @@ pub(super) fn improve(
     if !ranged && !delayed {
         return;
     }
-    let powers: Vec<i32> = if ranged { POWERS.collect() } else { vec![0] };
+    let powers: Vec<i32> = if ranged { GAIN_POWERS.collect() } else { vec![0] };
     let delays = if delayed { &DELAYS[..] } else { &DELAYS[..1] };
     let grid: Vec<(f64, i32)> = delays.iter().flat_map(|delay| powers.iter().map(|power| (*delay, *power))).collect();
-    let clips = &train[..train.len().min(CLIPS)];
+    let clips = &train[..train.len().min(CLIPS_OF_THE_GRID)];
     let all: Vec<Tried> = grid
         .par_iter()
         .map(|(delay, power)| {
@@ -55,7 +56,7 @@ pub(super) fn improve(
 }
 
 /// Whether cell.toml knows gains by range alone.
-pub(super) fn is_ranged(cell: &Cell) -> bool {
+pub fn is_ranged(cell: &Cell) -> bool {
     let controller = cell.controller.as_ref();
     let ranged = |values: &[f64], range: bool| range || values.is_empty();
     controller.is_some_and(|law| {
@@ -92,7 +93,7 @@ fn choose(dof: usize, all: &[Tried], settings: &[Setting], unknowns: &mut [Unkno
     let delays = all.iter().map(|tried| tried.delay);
     let Some(delay) = delays.min_by(|a, b| total(*a).total_cmp(&total(*b))) else { return };
     for (k, (setting, unknown)) in settings.iter().zip(unknowns).enumerate() {
-        let joint = joint_of(setting).unwrap_or(0);
+        let joint = setting.joint().unwrap_or(0);
         if let Some(tried) = best(delay, joint).filter(|tried| tried.costs[joint].is_finite()) {
             unknown.start = tried.numbers[k];
         }
@@ -100,7 +101,7 @@ fn choose(dof: usize, all: &[Tried], settings: &[Setting], unknowns: &mut [Unkno
 }
 
 /// Sum of squared residuals of each joint; infinite where the twin cannot be simulated.
-pub(super) fn costs(model: &Model<'_>, clips: &[usize], numbers: &[f64]) -> Joints {
+pub fn costs<F: Fn(&[f64]) -> Theta + Sync>(model: &ArmClips<F>, clips: &[usize], numbers: &[f64]) -> Joints {
     let mut sums = [0.0; MAX_JOINTS];
     let mut out = Vec::new();
     for clip in clips {

@@ -1,16 +1,9 @@
 //! Which control law leads the arm, where cell.toml does not say: gains are fitted under each law, and the one that leaves the least of
 //! the joints' motion is taken.
 
-use super::ArmError;
-use super::Numbers;
-use super::begun;
-use inference::estimate::ClipModel as _;
-use inference::estimate::fit;
-use inference::estimate::Schedule;
-use inference::interrupt::Interrupt;
-use inference::likelihood::Settings;
-use inference::likelihood::arm::ArmClips;
-use inference::likelihood::setting::{arm_numbers, complete};
+use super::{ControllerError, begun, fitted};
+use crate::interrupt::Interrupt;
+use crate::likelihood::setting::complete;
 use shared_mem::cell::{Cell, ControllerKind};
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
@@ -23,34 +16,34 @@ const LAWS: [ControllerKind; 4] = [
     ControllerKind::CompensatedPd,
 ];
 /// So many clips decide which law it is.
-const CLIPS: usize = 4;
+const CLIPS_THAT_DECIDE: usize = 4;
 /// A law that leaves less than this times as much as another fits as well.
-const ALIKE: f64 = 1.1;
+const FITS_AS_WELL_WITHIN: f64 = 1.1;
 
 /// The cell with the law that fits its clips best, and a sentence about it; `None` where cell.toml states the law, or there is no
 /// law to find. `given`: parameters that are known already.
 ///
 /// # Errors
-/// [`ArmError`] when the arm cannot be simulated under any law.
+/// [`ControllerError`] when the arm cannot be simulated under any law.
 pub(super) fn found(
     cell: &Cell,
     clips: &[Clip],
     given: Option<&Theta>,
     interrupt: &Interrupt,
-) -> Result<Option<(Cell, String)>, ArmError> {
+) -> Result<Option<(Cell, String)>, ControllerError> {
     let unstated = cell.controller.as_ref().is_some_and(|law| law.kind == ControllerKind::Unstated);
     let moving = || clips.iter().filter(|clip| !clip.measured.is_empty() && !clip.desired.is_empty());
     if !unstated || moving().next().is_none() {
         return Ok(None);
     }
-    let some: Vec<Clip> = moving().take(CLIPS).cloned().collect();
+    let some: Vec<Clip> = moving().take(CLIPS_THAT_DECIDE).cloned().collect();
     let mut left: Vec<(ControllerKind, f64)> = Vec::new();
     for kind in LAWS {
         let rest = left_under(&under(cell, kind), &some, given, interrupt)?;
         left.extend(rest.map(|rest| (kind, rest)));
     }
     let least = left.iter().map(|(_, rest)| *rest).fold(f64::INFINITY, f64::min);
-    let best = left.iter().find(|(_, rest)| *rest < ALIKE * least);
+    let best = left.iter().find(|(_, rest)| *rest < FITS_AS_WELL_WITHIN * least);
     Ok(best.map(|(kind, _)| (under(cell, *kind), sentence(*kind, &left))))
 }
 
@@ -68,17 +61,13 @@ fn left_under(
     clips: &[Clip],
     given: Option<&Theta>,
     interrupt: &Interrupt,
-) -> Result<Option<f64>, ArmError> {
+) -> Result<Option<f64>, ControllerError> {
     let base = begun(cell, &clips.iter().collect::<Vec<_>>(), &complete(cell, given)?, interrupt)?;
-    let (settings, unknowns): (Vec<_>, Vec<_>) = arm_numbers(cell, &base).into_iter().unzip();
-    let settings = Settings::new(base, settings);
-    let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
-    let (model, _) = ArmClips::means(cell, clips.to_vec(), numbers)?;
-    if model.clips() == 0 {
-        return Ok(None);
+    match fitted((cell, None), &base, clips.to_vec(), interrupt) {
+        Ok((_, fit)) if !fit.clips.is_empty() => Ok(Some(fit.misfit().sqrt())),
+        Ok(_) | Err(ControllerError::Impossible(_)) => Ok(None),
+        Err(error) => Err(error),
     }
-    let found = fit(&model, &unknowns, &model.random(), &Schedule::default(), |_, _| !interrupt.asked());
-    Ok(found.ok().map(|found| found.misfit().sqrt()))
 }
 
 fn sentence(kind: ControllerKind, left: &[(ControllerKind, f64)]) -> String {

@@ -14,21 +14,23 @@
 
 use inference::likelihood::setting::complete;
 use inference::likelihood::smoothing::{derivatives, half_width};
+use crate::likelihood::setting::complete;
+use crate::likelihood::smoothing::{derivatives, half_width};
 use nalgebra::{DMatrix, DVector};
 use shared_mem::cell::{Cell, ControllerKind, Ranges, Robot, TorqueSensing};
 use shared_mem::recording::Clip;
 use twin::arm::{ArmModel, JointState, Joints, stiffness_range};
 
 /// Rows that count are so far apart [ns]: smoothed over 80 ms to either side, those between say the same.
-const APART_NS: u64 = 10_000_000;
+const ROWS_APART_NS: u64 = 10_000_000;
 /// Speed at which dry friction is full [rad/s].
-const CREEP: f64 = 0.02;
-/// Fits that differ by more than this factor tell no stiffness.
-const APART: f64 = 4.0;
+const DRY_FRICTION_FULL_AT: f64 = 0.02;
+/// Fits that differ by more than this factor do not identify the stiffness.
+const LARGEST_SPREAD: f64 = 4.0;
 /// The search goes this factor beyond what the fits say: torques are of a nominal model.
-const BEYOND: f64 = 2.0;
+const SEARCHED_BEYOND: f64 = 2.0;
 /// Fewer clips cannot be left out in turn.
-const LEAST_CLIPS: usize = 3;
+const FEWEST_CLIPS: usize = 3;
 /// Columns of a fit: torque, error of velocity, velocity, its sign, one.
 const COLUMNS: usize = 5;
 
@@ -46,7 +48,7 @@ pub(super) fn found(cell: &Cell, clips: &[Clip]) -> Option<(Cell, String)> {
     }
     let arm = ArmModel::from_cell(cell).ok()?;
     let sums: Vec<Sums> = clips.iter().filter_map(|clip| of_clip(cell, &arm, clip)).collect();
-    if sums.len() < LEAST_CLIPS {
+    if sums.len() < FEWEST_CLIPS {
         return None;
     }
     let begun = complete(cell, None).ok()?.arm?.stiffness;
@@ -56,7 +58,7 @@ pub(super) fn found(cell: &Cell, clips: &[Clip]) -> Option<(Cell, String)> {
     for (joint, begun) in begun.iter().enumerate() {
         let stated = stiffness_range(controller, &arm, joint)?;
         let narrowed = fitted[joint].and_then(|[least, middle, most]| {
-            let range = [stated[0].max(least / BEYOND), stated[1].min(most * BEYOND)];
+            let range = [stated[0].max(least / SEARCHED_BEYOND), stated[1].min(most * SEARCHED_BEYOND)];
             (range[0] < range[1]).then(|| (middle.clamp(range[0], range[1]), range))
         });
         if let Some((middle, range)) = narrowed {
@@ -89,7 +91,7 @@ fn of_clip(cell: &Cell, arm: &ArmModel, clip: &Clip) -> Option<Sums> {
     let half = half_width(&measured.stamps_ns)?.max(half_width(&desired.stamps_ns)?);
     let from = (*measured.stamps_ns.first()?).max(*desired.stamps_ns.first()?) + half;
     let to = (*measured.stamps_ns.last()?).min(*desired.stamps_ns.last()?).checked_sub(half)?;
-    let at: Vec<u64> = (from..=to).step_by(APART_NS as usize).collect();
+    let at: Vec<u64> = (from..=to).step_by(ROWS_APART_NS as usize).collect();
     let [q, dq, ddq] = derivatives((&measured.stamps_ns, &measured.q, dof), &at, half);
     let [tau, ..] = derivatives((&measured.stamps_ns, &measured.tau, dof), &at, half);
     let [q_d, dq_d, ddq_d] = derivatives((&desired.stamps_ns, &desired.q, dof), &at, half);
@@ -107,7 +109,7 @@ fn of_clip(cell: &Cell, arm: &ArmModel, clip: &Clip) -> Option<Sums> {
         for (joint, (normal, right)) in sums.iter_mut().enumerate() {
             let k = row * dof + joint;
             let torque = tau[k] + rotor[joint] * ddq[k] - added[joint];
-            let x = DVector::from_vec(vec![torque, dq_d[k] - dq[k], dq[k], (dq[k] / CREEP).tanh(), 1.0]);
+            let x = DVector::from_vec(vec![torque, dq_d[k] - dq[k], dq[k], (dq[k] / DRY_FRICTION_FULL_AT).tanh(), 1.0]);
             *right += (q_d[k] - q[k]) * &x;
             *normal += &x * x.transpose();
         }
@@ -147,7 +149,7 @@ fn stiffness(sums: &[Sums], joint: usize) -> Option<[f64; 3]> {
     let least = all.iter().copied().fold(f64::INFINITY, f64::min);
     let most = all.iter().copied().fold(0.0, f64::max);
     let middle = (all.iter().map(|k| k.ln()).sum::<f64>() / all.len() as f64).exp();
-    (most < APART * least).then_some([least, middle, most])
+    (most < LARGEST_SPREAD * least).then_some([least, middle, most])
 }
 
 /// The first coefficient, columns that never change being left out.
