@@ -110,53 +110,16 @@ pub(super) fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_finding::{Seen, found};
     use super::*;
-    use inference::estimate::{ClipModel, Impossible, Options, at_bounds, fit};
 
-    /// Measurements of `x + share * y` and of `x` at a few places.
-    struct Line {
-        share: f64,
-    }
-
-    impl ClipModel for Line {
-        fn clips(&self) -> usize {
-            2
-        }
-
-        fn residuals(&self, clip: usize, shared: &[f64], _: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-            let [x, y] = [shared[0], shared[1]];
-            let noise = |row: u32| 0.3 * f64::from(row * 7 % 5) - 0.6;
-            out.clear();
-            out.extend((0..20).map(|row| {
-                let factor = if clip == 0 { self.share } else { self.share + 0.05 };
-                10.0 * (x + factor * y - 0.5 - 0.25 * factor) + noise(row)
-            }));
-            Ok(())
-        }
-    }
-
-    fn found(share: f64, asked: impl FnOnce(&Finding<'_>)) {
-        let unknown = |name: &str| Unknown { name: name.into(), start: 0.4, lower: -5.0, upper: 5.0, step: 1e-3 };
-        let unknowns = [unknown("friction"), unknown("mass")];
-        let fit = fit(&Line { share }, &unknowns, &[], &Options::default(), |_, _| true).expect("an answer");
-        let held = at_bounds(&unknowns, &fit.shared);
-        let intervals = Intervals::new(&fit, &held);
-        let settings = [Setting::Friction, Setting::Mass];
-        asked(&Finding {
-            settings: &settings,
-            unknowns: &unknowns,
-            fit,
-            held,
-            intervals,
-            simulated: 8,
-            convergence: Vec::new(),
-            arrived: true,
-        });
-    }
+    /// Two clips that see the sum of two numbers, and one of them a little better than the other.
+    const SUM: [Seen; 2] = [Seen { of: [1.0, 1.0], sigma: 0.1 }, Seen { of: [1.0, 1.05], sigma: 0.1 }];
+    const NUMBERS: [Setting; 2] = [Setting::Friction, Setting::Mass];
 
     #[test]
     fn a_finding_says_values_intervals_and_where_the_search_began() {
-        found(1.0, |finding| {
+        found(&NUMBERS, &SUM, |finding| {
             let answer = finding.answer("object", &[0.4, 0.3]);
             let friction = &answer.parameters["friction"];
             assert!(friction.single && friction.start == [0.4] && answer.parameters["mass"].start == [0.3]);
@@ -167,19 +130,42 @@ mod tests {
     }
 
     #[test]
+    fn a_value_on_its_bound_is_named_and_its_interval_is_open() {
+        // Both clips see values beyond the bound of 1.
+        let beyond = [Seen { of: [0.1, 0.0], sigma: 0.01 }, Seen { of: [0.0, 1.0], sigma: 0.01 }];
+        found(&NUMBERS, &beyond, |finding| {
+            let answer = finding.answer("object", &[0.4; 2]);
+            assert_eq!((answer.at_bounds.as_slice(), finding.nearer_bound(0)), (&["friction".to_owned()][..], "upper"));
+            assert_eq!(answer.parameters["friction"].ci95[0], [f64::NEG_INFINITY, f64::INFINITY]);
+            assert!(answer.parameters["mass"].ci95[0][1].is_finite());
+        });
+    }
+
+    #[test]
+    fn numbers_of_joints_stand_together_in_their_order() {
+        let gains = [Setting::Stiffness(0), Setting::Stiffness(1)];
+        let each = [Seen { of: [1.0, 0.0], sigma: 0.1 }, Seen { of: [0.0, 1.0], sigma: 0.1 }];
+        found(&gains, &each, |finding| {
+            let answer = finding.answer("arm", &[0.4; 2]);
+            let stiffness = &answer.parameters["stiffness"];
+            assert_eq!((answer.parameters.len(), stiffness.value.len(), stiffness.single), (1, 2, false));
+            assert!(stiffness.value.iter().all(|value| (value - 0.5).abs() < 0.1), "{stiffness:?}");
+            assert_eq!((stiffness.unit.as_str(), &answer.names[1][..]), ("N m/rad", "stiffness[1]"));
+            assert_eq!(finding.partner(0), None, "each is seen by itself");
+        });
+    }
+
+    #[test]
     fn numbers_that_move_together_are_named_and_more_information_narrows_the_widest_interval() {
-        found(1.0, |finding| {
+        found(&NUMBERS, &SUM, |finding| {
             let (name, r) = finding.partner(0).expect("two sums that are nearly one");
             assert!(name == "mass" && r < -MOVE_TOGETHER, "{name} {r}");
             let more = |times: f64| (format!("{times}"), finding.fit.information() * times);
-            let advice =
-                finding.advice(|k| finding.intervals.half_width[k], [more(1.0), more(4.0), more(2.0), more(3.0)]);
+            let advice = finding.advice(|k| k as f64, [more(1.0), more(4.0), more(2.0), more(3.0)]);
             let order: Vec<&str> = advice.iter().map(|advice| advice.record.as_str()).collect();
             assert_eq!(order, ["4", "3", "2"]);
-            assert!(
-                advice.iter().all(|advice| advice.predicted < advice.now && advice.parameter == "mass"),
-                "{advice:?}"
-            );
+            let narrower = |advice: &Advice| advice.predicted < advice.now && advice.parameter == "mass";
+            assert!(advice.iter().all(narrower), "{advice:?}");
         });
     }
 }

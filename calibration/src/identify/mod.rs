@@ -18,6 +18,8 @@ pub mod joint;
 pub mod object;
 mod options;
 mod run;
+#[cfg(test)]
+mod test_finding;
 mod used;
 
 pub use crate::answer::identification::Identification;

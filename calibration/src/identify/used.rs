@@ -41,3 +41,49 @@ impl Used {
         answer.warnings.extend(remarks);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_mem::cell::ClipKind;
+    use shared_mem::recording::{JointSeries, ObjectSeries};
+
+    /// A joint that swings so fast.
+    fn clip(speed: u32) -> Clip {
+        let stamps_ns: Vec<u64> = (0..200).map(|row| row * 10_000_000).collect();
+        let q = (0..200).map(|row| (f64::from(speed) * f64::from(row) * 0.01).sin()).collect();
+        let desired = JointSeries { stamps_ns, dof: 1, q, ..JointSeries::default() };
+        Clip {
+            file: "clip.mcap".into(),
+            kind: ClipKind::Excitation,
+            torques_end_at_rows: false,
+            origins: shared_mem::origin::Origins::default(),
+            joint_names: vec!["a".into()],
+            measured: desired.clone(),
+            desired,
+            object: ObjectSeries::default(),
+            others: Vec::new(),
+            warnings: Vec::new(),
+            damage: None,
+        }
+    }
+
+    #[test]
+    fn repeats_stay_on_one_side_and_a_single_motion_leaves_nothing_to_hold_out() {
+        let clips = [1, 2, 1, 3, 4].map(clip);
+        let files = ["a", "b", "c", "d", "e"];
+        let all: Vec<(&str, &Clip)> = files.into_iter().zip(&clips).collect();
+        for seed in 0..8 {
+            let used = Used::of(&all, Vec::new(), seed);
+            let Clips { train, holdout, .. } = &used.clips;
+            assert_eq!(train.len() + holdout.len(), 5);
+            assert_eq!(train.contains(&"a".to_owned()), train.contains(&"c".to_owned()), "seed {seed}");
+            assert!((1..=2).contains(&holdout.len()) && used.warnings("another").is_empty(), "{holdout:?}");
+        }
+        let alone = Used::of(&[all[0], all[2]], vec![LeftOut { file: "f".into(), why: "not hit".into() }], 0);
+        assert!(alone.clips.holdout.is_empty() && alone.split.train == [0, 1]);
+        let said = alone.warnings("another motion");
+        assert!(said[0].contains("a single motion") && said[0].ends_with("record another motion"), "{said:?}");
+        assert_eq!(said[1], "1 of 3 clips were left out: f: not hit");
+    }
+}

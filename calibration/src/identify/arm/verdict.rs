@@ -127,3 +127,26 @@ pub(super) fn next(finding: &Finding<'_>, clips: &Used) -> Vec<Advice> {
     });
     finding.advice(width, more)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::test_finding::{Seen, found};
+
+    #[test]
+    fn on_a_bound_an_effect_that_is_absent_is_an_answer_and_a_gain_is_open() {
+        // The first number is driven to its upper bound, the second to nothing.
+        let seen = [Seen { of: [0.1, 0.0], sigma: 0.01 }, Seen { of: [5.0, 5.0], sigma: 0.01 }];
+        let effect = twin::effects::registry().iter().find(|effect| effect.stage == twin::effects::Stage::Control);
+        let effect = effect.expect("an effect on the arm");
+        let parameter = effect.parameters[0].name;
+        let effect = Setting::Effect { name: effect.name, parameter, index: None, inverse: false };
+        found(&[Setting::Stiffness(0), effect], &seen, |finding| {
+            assert!(finding.held == [true; 2] && finding.fit.shared[1] == 0.0, "{:?}", finding.fit.shared);
+            assert!(
+                at_bound(finding, 0).is_some_and(|why| why.contains("upper bound") && why.contains("stiffness_range"))
+            );
+            assert_eq!(at_bound(finding, 1), None);
+        });
+    }
+}

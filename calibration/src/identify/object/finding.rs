@@ -112,3 +112,54 @@ fn remedy(setting: &Setting, material: &Material) -> &'static str {
         _ => "record longer slides",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::test_finding::{Seen, found};
+    use crate::identify::used::Used;
+    use shared_mem::cell::{Cell, Robot};
+
+    fn said(clips: &[Seen], robot: Option<Robot>) -> Identification {
+        let cell = Cell { robot, ..Cell::default() };
+        let mut used = Used::of(&[], Vec::new(), 0);
+        used.clips.train = vec!["a.mcap".into(), "b.mcap".into()];
+        let material = Material { cell, usable: Vec::new(), used, remarks: Vec::new() };
+        let mut all = Identification::default();
+        found(&[Setting::Friction, Setting::TipFriction], clips, |finding| {
+            all = answer(finding, &[1.0, 0.4], &material);
+        });
+        all
+    }
+
+    fn why(answer: &Identification, parameter: &str) -> String {
+        let open = answer.not_identifiable.iter().find(|open| open.parameter == parameter);
+        open.map_or_else(String::new, |open| open.why.clone())
+    }
+
+    #[test]
+    fn what_is_seen_well_is_no_open_number_and_a_clip_that_counts_less_is_named() {
+        let answer = said(&[Seen { of: [1.0, 0.0], sigma: 0.05 }, Seen { of: [0.0, 1.0], sigma: 0.05 }], None);
+        assert_eq!(answer.not_identifiable, []);
+        assert!(
+            answer.warnings.iter().any(|warning| warning.starts_with("b.mcap fits worse") && warning.ends_with("40 %"))
+        );
+        let advice = &answer.advice[0];
+        assert!(advice.record.starts_with("one more toss like ") && advice.predicted < advice.now, "{advice:?}");
+    }
+
+    #[test]
+    fn a_number_is_open_on_its_bound_where_nothing_shows_it_and_where_only_a_sum_does() {
+        let bound =
+            said(&[Seen { of: [0.1, 0.0], sigma: 0.01 }, Seen { of: [0.0, 1.0], sigma: 0.05 }], Some(Robot::default()));
+        assert!(why(&bound, "friction").contains("the upper bound of its range"), "{:?}", bound.not_identifiable);
+        assert!(why(&bound, "friction").ends_with("or ask `calibration diagnose` what else acts"));
+        let unseen = said(&[Seen { of: [1.0, 0.0], sigma: 0.05 }; 2], None);
+        assert!(why(&unseen, "tip_friction").contains("nothing in these clips depends on it"));
+        assert!(why(&unseen, "tip_friction").ends_with("record strokes that meet the object's face askew"));
+        let sum = said(&[Seen { of: [1.0, 1.0], sigma: 0.3 }, Seen { of: [1.0, 1.05], sigma: 0.3 }], None);
+        assert!(why(&sum, "friction").contains("moves together with tip friction"), "{:?}", sum.not_identifiable);
+        let nothing = said(&[Seen { of: [0.0; 2], sigma: 0.1 }; 2], None);
+        assert!(nothing.warnings.iter().any(|warning| warning.contains("nothing in these clips depends on any")));
+    }
+}

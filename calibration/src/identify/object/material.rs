@@ -18,7 +18,7 @@ pub(super) struct Material {
     pub(super) usable: Vec<Usable>,
     pub(super) used: Used,
     /// What is odd about clips that are used, a line a kind of remark.
-    remarks: Vec<String>,
+    pub(super) remarks: Vec<String>,
 }
 
 impl Material {
