@@ -54,8 +54,7 @@ pub(super) struct Run<'a> {
     pub(super) seed: u64,
     /// Points whose cost a search without slopes may ask for.
     pub(super) budget: usize,
-    pub(super) kept: &'a Kept,
-    pub(super) interrupt: &'a Interrupt,
+    pub(super) work: Work<'a>,
 }
 
 /// The end of a search.
@@ -90,7 +89,7 @@ impl Run<'_> {
             Optimizer::LeastSquares => USUAL_LINEARISATIONS * (1 + self.unknowns.len()) * per_point,
             _ => self.budget * per_point,
         };
-        let watch = Watch::new(expected, self.interrupt);
+        let watch = Watch::new(expected, self.work.interrupt);
         let outcome = match self.optimizer {
             Optimizer::LeastSquares => self.least_squares(&watch, model, first),
             Optimizer::Swarm => {
@@ -102,7 +101,7 @@ impl Run<'_> {
                 self.without_slopes(&watch, model, evolution)
             }
         };
-        stopped(self.kept, self.interrupt)?;
+        stopped(self.work)?;
         outcome
     }
 
@@ -116,13 +115,14 @@ impl Run<'_> {
         let at_rest = |shared, clips| Place::at_rest(shared, self.random, clips);
         let all = Watched { model, watch };
         type Way = (Underway, Vec<[f64; 2]>);
-        let (now, way): Way = match self.kept.known(&step("way")) {
+        let (now, way): Way = match self.work.kept.known(&step("way")) {
             Some(known) => known,
             None => {
                 let start = if first.clips() < model.clips() {
                     let few = Watched { model: first, watch };
                     let (from, schedule) = (at_rest(start, first.clips()), Schedule::of(FIRST));
-                    fit_from(&few, self.unknowns, self.random, from, &schedule, |_, _| !self.interrupt.asked())?.shared
+                    fit_from(&few, self.unknowns, self.random, from, &schedule, |_, _| !self.work.interrupt.asked())?
+                        .shared
                 } else {
                     start
                 };
@@ -138,8 +138,8 @@ impl Run<'_> {
             if way.len() < now.fit.history.len() {
                 way.push([watch.simulated() as f64, now.fit.deviance()]);
             }
-            self.kept.keep(&step("way"), &(now, &*way));
-            !self.interrupt.asked()
+            self.work.kept.keep(&step("way"), &(now, &*way));
+            !self.work.interrupt.asked()
         })?;
         let rows = fit.clips.iter().map(|clip| clip.rows).sum::<usize>().max(1) as f64;
         let mut convergence = way.into_inner().expect("no holder panics");
@@ -155,7 +155,7 @@ impl Run<'_> {
         mut search: impl Search,
     ) -> Result<Outcome, RunError> {
         let all = Watched { model, watch };
-        let answers: Vec<Vec<f64>> = self.kept.known(&step("answers")).unwrap_or_default();
+        let answers: Vec<Vec<f64>> = self.work.kept.known(&step("answers")).unwrap_or_default();
         watch.already(answers.iter().map(Vec::len).sum::<usize>() * model.clips());
         let mut so_far = answers.clone();
         let found: Found = minimise(
@@ -165,11 +165,11 @@ impl Run<'_> {
             &answers,
             |x| self.cost(&all, x),
             |costs, _| {
-                if self.interrupt.asked() {
+                if self.work.interrupt.asked() {
                     return false;
                 }
                 so_far.push(costs.to_vec());
-                self.kept.keep(&step("answers"), &so_far);
+                self.work.kept.keep(&step("answers"), &so_far);
                 true
             },
         );
@@ -199,8 +199,22 @@ impl Run<'_> {
     }
 }
 
+/// Where the steps of long work are kept, and what cuts it short.
+#[derive(Clone, Copy)]
+pub(super) struct Work<'a> {
+    pub(super) kept: &'a Kept,
+    pub(super) interrupt: &'a Interrupt,
+}
+
+impl<'a> Work<'a> {
+    /// Of which nothing is kept.
+    pub(super) fn passing(interrupt: &'a Interrupt) -> Self {
+        Self { kept: Kept::nothing(), interrupt }
+    }
+}
+
 /// Whether the user asked for the end: then what was found so far is taken to its file.
-pub(super) fn stopped(kept: &Kept, interrupt: &Interrupt) -> Result<(), RunError> {
+pub(super) fn stopped(Work { kept, interrupt }: Work<'_>) -> Result<(), RunError> {
     if interrupt.asked() { Err(RunError::Interrupted(kept.farewell(&typed::command()))) } else { Ok(()) }
 }
 
@@ -209,11 +223,12 @@ pub(super) fn concluded<E: From<RunError> + From<OutputError>>(
     found: Result<(Identification, Theta), E>,
     out: Option<&Path>,
     began: Instant,
-    (kept, interrupt): (&Kept, &Interrupt),
+    work: Work<'_>,
 ) -> Result<Identification, E> {
+    let Work { kept, interrupt } = work;
     interrupt.work_is_over();
     // What work says that was cut short is no answer.
-    stopped(kept, interrupt)?;
+    stopped(work)?;
     let (mut answer, theta) = found?;
     if let Some(out) = out {
         theta.write(out)?;

@@ -18,14 +18,15 @@ mod verdict;
 
 use super::finding::Finding;
 pub use super::options::Options;
-use super::run::{Outcome, Run, RunError, concluded};
+use super::run::{Outcome, Run, RunError, Work, concluded};
 use super::used::Used;
 use crate::answer::identification::Identification;
 use inference::controller::{ControllerError, controlled, start};
 use inference::engine;
 use inference::estimate::{Intervals, Random, Subset, Unknown, at_bounds};
 use inference::interrupt::Interrupt;
-use inference::kept::{self, Fingerprint, Kept};
+use inference::kept;
+use inference::kept::Fingerprint;
 use inference::likelihood::arm::ArmClips;
 use inference::likelihood::setting::{BaseError, arm_numbers, complete, effect_settings};
 use inference::likelihood::{Setting, Settings};
@@ -123,8 +124,9 @@ fn identify_material(material: Material, options: &Options, interrupt: &Interrup
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
         .with_clips(&material.clips);
     let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_arm"), &question, interrupt);
-    let found = identify_kept(material, given.as_ref(), options, (&kept, interrupt));
-    concluded(found, options.out.as_deref(), began, (&kept, interrupt))
+    let work = Work { kept: &kept, interrupt };
+    let found = identify_kept(material, given.as_ref(), options, work);
+    concluded(found, options.out.as_deref(), began, work)
 }
 
 /// The answer, and the parameters that are written.
@@ -132,8 +134,9 @@ fn identify_kept(
     Material { cell, clips, left_out }: Material,
     given: Option<&Theta>,
     options: &Options,
-    (kept, interrupt): (&Kept, &Interrupt),
+    work: Work<'_>,
 ) -> Result<(Identification, Theta), ArmError> {
+    let Work { kept, interrupt } = work;
     let mut remarks = Vec::new();
     let cell = controlled(cell, &clips, given, &mut remarks, interrupt)?;
     let base = complete(&cell, given)?;
@@ -160,7 +163,7 @@ fn identify_kept(
     }
     session::hold_dead(&model, &clips.split.train, settings.settings(), &mut unknowns);
     let random = model.random();
-    let mut outcome = search(options, &model, &clips, (&unknowns, &random), (kept, interrupt))?;
+    let mut outcome = search(options, &model, &clips, (&unknowns, &random), work)?;
     let error = kept.once_if_ok(&Fingerprint::of("time step"), || {
         time_step::error(&model, &clips.split.train, (&unknowns, &random), &outcome.fit)
     });
@@ -224,17 +227,9 @@ fn search(
     model: &Model<'_>,
     clips: &Used,
     (unknowns, random): (&[Unknown], &[Random]),
-    (kept, interrupt): (&Kept, &Interrupt),
+    work: Work<'_>,
 ) -> Result<Outcome, ArmError> {
-    let run = Run {
-        unknowns,
-        random,
-        optimizer: options.optimizer,
-        seed: options.seed,
-        budget: options.budget,
-        kept,
-        interrupt,
-    };
+    let run = Run { unknowns, random, optimizer: options.optimizer, seed: options.seed, budget: options.budget, work };
     let train = &clips.split.train;
     let all = Subset { model, clips: train };
     // A rough fit to a third of the clips brings the rest near for a third of the price.

@@ -10,7 +10,7 @@ use super::paper::SurfaceLoss;
 use super::polish::{fit_polished, fit_poses_alone};
 use super::{ObjectError, Options, Problem};
 use crate::answer::identification::Figures;
-use crate::identify::run::{Optimizer, Run, stopped};
+use crate::identify::run::{Optimizer, Run, Work, stopped};
 use inference::estimate::{ClipModel as _, Unknown};
 use inference::interrupt::Interrupt;
 use inference::kept::Kept;
@@ -67,7 +67,7 @@ pub struct Method {
 /// [`ObjectError`] naming what is wrong and the remedy.
 pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, ObjectError> {
     let material = Material::open(options)?;
-    let problem = Problem::new(&material, options, (Kept::nothing(), interrupt))?;
+    let problem = Problem::new(&material, options, Work::passing(interrupt))?;
     let without: Vec<usize> = (0..problem.unknowns.len())
         .filter(|k| !matches!(problem.settings.settings()[*k], Setting::CentreOfMass(_)))
         .collect();
@@ -77,7 +77,7 @@ pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, O
     let swarm = slopeless("particle swarm", Optimizer::Swarm, &problem, &material, options, interrupt)?;
     let evolution = slopeless("CMA-ES", Optimizer::Evolution, &problem, &material, options, interrupt)?;
     let slopes = sloped("gradient without centre of mass", &pin, &material, Searcher::Slopes, interrupt)?;
-    stopped(Kept::nothing(), interrupt)?;
+    stopped(Work::passing(interrupt))?;
     let target = swarm.loss_m;
     let clips = |method: &Method| method.to(target).map(|(clips, _)| clips as f64);
     let fewer = clips(&alone).zip(clips(&swarm)).map(|(alone, swarm)| swarm / alone);
@@ -175,8 +175,7 @@ fn slopeless(
         optimizer,
         seed: options.seed,
         budget: options.budget,
-        kept: Kept::nothing(),
-        interrupt,
+        work: Work::passing(interrupt),
     };
     let began = Instant::now();
     let outcome = run.search(&loss, &loss)?;

@@ -1,9 +1,9 @@
 //! What a fit says about the object, number by number: what the clips cannot tell and why, and what to record next.
 
+use super::Problem;
 use super::fit::ObjectFit;
 use super::material::Material;
 use crate::answer::identification::{Identification, NotIdentifiable};
-use inference::estimate::Unknown;
 use inference::likelihood::{Setting, Settings};
 use crate::identify::finding::Finding;
 
@@ -16,7 +16,7 @@ const FULL_WEIGHT: f64 = 0.99;
 
 /// The fit with its intervals; `disagreement`: half widths that they have at least.
 pub(super) fn finding<'a>(
-    (settings, unknowns): (&'a Settings, &'a [Unknown]),
+    Problem { settings, unknowns, .. }: &'a Problem,
     found: &ObjectFit,
     disagreement: &[f64],
 ) -> Finding<'a> {

@@ -9,7 +9,6 @@ use inference::admit::remarks::reasons;
 use inference::admit::{Looked, Usable};
 use shared_mem::console;
 use shared_mem::recording::{Clip, Session};
-use std::path::Path;
 use twin::arm::{ArmModel, ModelError};
 
 /// A session in memory.
@@ -30,17 +29,17 @@ impl Material {
         let arm = arm_of(&session.cell)?;
         let look = |clip| for_object(clip, &session.cell, arm.as_ref());
         let looked = Looked::of_session(&session, |entry| entry.kind != ClipKind::Excitation, look);
-        Self::of(session.cell.clone(), looked, (&options.session, options.seed))
+        Self::of(session.cell.clone(), looked, options)
     }
 
-    /// Of clips in memory; `path`: what the session is called in errors.
-    pub(super) fn of_clips(cell: Cell, clips: Vec<Clip>, (path, seed): (&Path, u64)) -> Result<Self, ObjectError> {
+    /// Of clips in memory.
+    pub(super) fn of_clips(cell: Cell, clips: Vec<Clip>, options: &Options) -> Result<Self, ObjectError> {
         let arm = arm_of(&cell)?;
         let looked = Looked::of_clips(clips, |clip| for_object(clip, &cell, arm.as_ref()));
-        Self::of(cell, looked, (path, seed))
+        Self::of(cell, looked, options)
     }
 
-    fn of(cell: Cell, looked: Looked, (path, seed): (&Path, u64)) -> Result<Self, ObjectError> {
+    fn of(cell: Cell, looked: Looked, options: &Options) -> Result<Self, ObjectError> {
         if cell.object().is_none() {
             return Err(ObjectError::NoObject);
         }
@@ -49,10 +48,10 @@ impl Material {
         if usable.is_empty() {
             let reasons = reasons(&left_out);
             let why = if reasons.is_empty() { "it lists none with an object".into() } else { reasons };
-            return Err(ObjectError::NoClip { session: path.display().to_string(), why });
+            return Err(ObjectError::NoClip { session: options.session.display().to_string(), why });
         }
         let all: Vec<(&str, &Clip)> = usable.iter().map(|usable| (usable.file.as_str(), &usable.clip)).collect();
-        let used = Used::of(&all, left_out, seed);
+        let used = Used::of(&all, left_out, options.seed);
         Ok(Self { cell, usable, used, remarks })
     }
 

@@ -29,7 +29,7 @@ mod step;
 mod vicinity;
 
 pub use super::options::Options;
-use super::run::{Optimizer, Outcome, Run, RunError, concluded};
+use super::run::{Optimizer, Outcome, Run, RunError, Work, concluded};
 use crate::answer::identification::Identification;
 use fit::{ObjectFit, fit_object, linearise_object};
 use inference::controller::{self, ControllerError};
@@ -125,8 +125,8 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
         .with(&engine.map(|engine| engine.ability().print()))
         .with_clips(material.usable.iter().map(|usable| &usable.clip));
     let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_object"), &question, interrupt);
-    let found = identify_kept(&material, options, (&kept, interrupt));
-    concluded(found, options.out.as_deref(), began, (&kept, interrupt))
+    let work = Work { kept: &kept, interrupt };
+    concluded(identify_kept(&material, options, work), options.out.as_deref(), began, work)
 }
 
 /// The same from clips in memory; nothing is kept or written.
@@ -140,8 +140,8 @@ pub fn identify_clips(
     interrupt: &Interrupt,
 ) -> Result<Identification, ObjectError> {
     let began = Instant::now();
-    let material = Material::of_clips(cell.clone(), clips, (&options.session, options.seed))?;
-    let (mut answer, _) = identify_kept(&material, options, (Kept::nothing(), interrupt))?;
+    let material = Material::of_clips(cell.clone(), clips, options)?;
+    let (mut answer, _) = identify_kept(&material, options, Work::passing(interrupt))?;
     answer.seconds = began.elapsed().as_secs_f64();
     Ok(answer)
 }
@@ -150,16 +150,15 @@ pub fn identify_clips(
 fn identify_kept(
     material: &Material,
     options: &Options,
-    (kept, interrupt): (&Kept, &Interrupt),
+    work: Work<'_>,
 ) -> Result<(Identification, Theta), ObjectError> {
-    let problem = Problem::new(material, options, (kept, interrupt))?;
+    let problem = Problem::new(material, options, work)?;
     let (engine, nominal) = (options.engine.as_ref(), complete(&material.cell, None)?);
     let clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
     let mut clips = clips.simulated_by(engine, &nominal);
-    let found = problem.search(&mut clips, options, (kept, interrupt))?;
-    let searched = (&problem.settings, &problem.unknowns[..]);
-    let disagreement = disagreement(&found.at.shared, &clips, searched, (kept, interrupt))?;
-    let finding = finding::finding(searched, &found, disagreement.as_deref().unwrap_or_default());
+    let found = problem.search(&mut clips, options, work)?;
+    let disagreement = disagreement(&found.at.shared, &clips, &problem, work)?;
+    let finding = finding::finding(&problem, &found, disagreement.as_deref().unwrap_or_default());
     let theta = problem.settings.theta(&found.at.shared);
     let mut answer = finding::answer(&finding, &found.at.weights, material);
     answer.session = options.session.display().to_string();
@@ -192,11 +191,8 @@ struct Problem {
 }
 
 impl Problem {
-    fn new(
-        material: &Material,
-        options: &Options,
-        (kept, interrupt): (&Kept, &Interrupt),
-    ) -> Result<Self, ObjectError> {
+    fn new(material: &Material, options: &Options, work: Work<'_>) -> Result<Self, ObjectError> {
+        let Work { kept, interrupt } = work;
         let mut given = options.parameters.as_deref().map(Theta::read).transpose()?.unwrap_or_default();
         given = given.about(&material.cell);
         let mut warnings = Vec::new();
@@ -221,20 +217,14 @@ impl Problem {
         Ok(Self { settings, unknowns, known: given, warnings })
     }
 
-    fn search(
-        &self,
-        clips: &mut ObjectClips,
-        options: &Options,
-        (kept, interrupt): (&Kept, &Interrupt),
-    ) -> Result<ObjectFit, ObjectError> {
+    fn search(&self, clips: &mut ObjectClips, options: &Options, work: Work<'_>) -> Result<ObjectFit, ObjectError> {
         let run = Run {
             unknowns: &self.unknowns,
             random: &[],
             optimizer: options.optimizer,
             seed: options.seed,
             budget: options.budget,
-            kept,
-            interrupt,
+            work,
         };
         if options.optimizer == Optimizer::LeastSquares {
             return self.least_squares(clips, &run);
@@ -254,10 +244,10 @@ impl Problem {
         let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
         let bar = Progress::new("identify", fit::usual_evaluations(clips, &self.unknowns) as u64);
         let shape = self.shape(clips)?;
-        let trail = (run.kept, "fit");
+        let trail = (run.work.kept, "fit");
         Ok(fit_polished(clips, self.searched(&shape, run.seed), &start, trail, |_, evaluations| {
             bar.show(evaluations as u64, &format!("{evaluations} clips simulated"));
-            !run.interrupt.asked()
+            !run.work.interrupt.asked()
         })?)
     }
 

@@ -3,22 +3,22 @@
 //! A body that tumbles answers so unevenly that slopes at one point say nothing of how far an answer may be off. Four
 //! parts of the tosses, each fitted by itself, do: their spread is that of the answer, whatever the reason.
 
-use super::ObjectError;
 use super::fit::fit_object;
 use super::polish::let_go;
+use super::{ObjectError, Problem};
+use crate::identify::run::Work;
+use inference::estimate::ClipModel as _;
 use inference::estimate::interval::LEVEL;
-use inference::estimate::{ClipModel as _, Unknown};
-use inference::interrupt::Interrupt;
-use inference::kept::Kept;
 use inference::likelihood::Settings;
 use inference::likelihood::object::ObjectClips;
 use inference::statistics::student;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
 
+/// As few as a spread can be taken of, so that each holds many clips (a choice).
 const PARTS: usize = 4;
-/// Fewer clips make no part.
-const LEAST: usize = 4;
+/// Fewer clips make no part (a choice).
+const FEWEST_OF_A_PART: usize = 4;
 
 /// Half of the 95 % interval of every number by what parts of the clips disagree; 0 where the clips are no tosses or too
 /// few. `None`: the user asked for the end.
@@ -28,10 +28,10 @@ const LEAST: usize = 4;
 pub(super) fn disagreement(
     at: &[f64],
     clips: &ObjectClips,
-    (settings, unknowns): (&Settings, &[Unknown]),
-    (kept, interrupt): (&Kept, &Interrupt),
+    problem: &Problem,
+    Work { kept, interrupt }: Work<'_>,
 ) -> Result<Option<Vec<f64>>, ObjectError> {
-    if !let_go(clips) || clips.clips() < PARTS * LEAST {
+    if !let_go(clips) || clips.clips() < PARTS * FEWEST_OF_A_PART {
         return Ok(Some(vec![0.0; at.len()]));
     }
     let (bar, mut answers) = (Progress::new("intervals", PARTS as u64), Vec::new());
@@ -39,9 +39,9 @@ pub(super) fn disagreement(
         bar.show(part as u64, "a part of the tosses by itself");
         let of_part = |clip: &usize| clip % PARTS == part;
         let own: Vec<Clip> = (0..clips.clips()).filter(of_part).map(|clip| clips.clip(clip).clone()).collect();
-        let mut own = ObjectClips::new(clips.cell(), own, settings.clone())?;
+        let mut own = ObjectClips::new(clips.cell(), own, problem.settings.clone())?;
         let name = format!("part {part}");
-        answers.push(fit_object(&mut own, unknowns, at, (kept, &name), |_, _| !interrupt.asked())?.at.shared);
+        answers.push(fit_object(&mut own, &problem.unknowns, at, (kept, &name), |_, _| !interrupt.asked())?.at.shared);
         if interrupt.asked() {
             return Ok(None);
         }
