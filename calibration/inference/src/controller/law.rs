@@ -15,9 +15,9 @@ const LAWS: [ControllerKind; 4] = [
     ControllerKind::JointPd,
     ControllerKind::CompensatedPd,
 ];
-/// So many clips decide which law it is.
+/// So many clips decide which law it is (a choice).
 const CLIPS_THAT_DECIDE: usize = 4;
-/// A law that leaves less than this times as much as another fits as well.
+/// A law that leaves less than this times as much as another fits as well (a choice).
 const FITS_AS_WELL_WITHIN: f64 = 1.1;
 
 /// The cell with the law that fits its clips best, and a sentence about it; `None` where cell.toml states the law, or there is no

@@ -21,7 +21,7 @@ use inference::likelihood::Evidence;
 /// What nobody fitted closes nothing.
 const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
 /// Of numbers with which the twin has no answer in the clips kept for confirming.
-const FLOWN: Share = Share { value: DOUBLED, ci90: [DOUBLED; 2] };
+const NO_ANSWER: Share = Share { value: DOUBLED, ci90: [DOUBLED; 2] };
 
 /// What is said of every candidate: what was named first, then what is possible, then the likelier.
 pub(super) fn candidates<E: Evidence>(
@@ -58,7 +58,7 @@ pub(super) fn candidates<E: Evidence>(
             None => None,
         };
         let closed = with.as_ref().zip(left[place].as_ref()).map(|(with, from)| with.shrink_added(from, before, seed));
-        let shrink = closed.unwrap_or(if trial.fitted.is_some() { FLOWN } else { NOT_FITTED });
+        let shrink = closed.unwrap_or(if trial.fitted.is_some() { NO_ANSWER } else { NOT_FITTED });
         let beside: Vec<&str> = step.from.effects.iter().map(|k| bench.library.candidates[*k].effect.name).collect();
         let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
         let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn numbers_that_fit_some_clips_alone_are_named() {
-        assert!(carried_over(&FLOWN).contains("more than doubles"));
+        assert!(carried_over(&NO_ANSWER).contains("more than doubles"));
         assert_eq!(carried_over(&Share { value: -0.4, ci90: [-0.6, 0.1] }), "");
         assert_eq!(carried_over(&NOT_FITTED), "");
     }

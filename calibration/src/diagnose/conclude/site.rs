@@ -14,11 +14,11 @@ use shared_mem::typed::{Command, quoted};
 use std::path::{Path, PathBuf};
 
 /// Clips that are repeated to confirm something.
-const TWO: usize = 2;
-/// A faster clip is worth it from this factor on.
-const WORTH: f64 = 1.2;
-/// Twice as fast is enough.
-const TWICE: f64 = 2.0;
+const CLIPS_REPEATED: usize = 2;
+/// A faster clip is worth it from this factor on (a choice).
+const WORTH_PLAYING_FASTER: f64 = 1.2;
+/// So many times as fast is enough (a choice).
+const FAST_ENOUGH: f64 = 2.0;
 
 /// What to record next.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -115,13 +115,13 @@ impl Site {
             let of = (kind, session.cell.object_name());
             let numbers =
                 session.clips.iter().filter(|clip| clip.kind == kind).filter_map(|clip| number_of(&clip.file));
-            for number in numbers.take(2 * TWO) {
+            for number in numbers.take(2 * CLIPS_REPEATED) {
                 let Ok(clip) = recorded::read(&session.folder, number, of, &body) else { continue };
                 if clips.is_empty() {
                     fastest = pace::largest(&clip.set_points, &limits::of(&session.cell, &body), &body);
                 }
                 clips.push(number);
-                if clips.len() == TWO {
+                if clips.len() == CLIPS_REPEATED {
                     break;
                 }
             }
@@ -202,15 +202,15 @@ impl Site {
 
     /// Repeats: the words for it and the commands. Of eight only one clip is repeated, of two both.
     pub(in crate::diagnose) fn again(&self, times: usize) -> (String, Steps) {
-        let fast = (100.0 * self.fastest.min(TWICE)).floor() / 100.0;
+        let fast = (100.0 * self.fastest.min(FAST_ENOUGH)).floor() / 100.0;
         let speeds = match fast {
-            fast if fast >= TWICE => "one at half and one at twice the speed".to_owned(),
-            fast if fast >= WORTH => {
+            fast if fast >= FAST_ENOUGH => "one at half and one at twice the speed".to_owned(),
+            fast if fast >= WORTH_PLAYING_FASTER => {
                 format!("one at half and one at {fast} times the speed, the most that the limits allow")
             }
             _ => "one at half the speed".to_owned(),
         };
-        let what = if times > TWO { "repeat one clip eight times" } else { "repeat two clips" };
+        let what = if times > CLIPS_REPEATED { "repeat one clip eight times" } else { "repeat two clips" };
         if self.alone {
             return (
                 format!("let the object go {times} times more, in other directions and at other speeds"),
@@ -223,14 +223,14 @@ impl Site {
             let usual = ArmMotion::of(Kind::Multisine, times);
             return (words, self.steps(&[usual, ArmMotion { speed: 0.5, ..ArmMotion::of(Kind::Multisine, 2) }]));
         };
-        let all: Vec<String> = self.clips.iter().take(TWO).map(ToString::to_string).collect();
-        let repeated = if times > TWO {
+        let all: Vec<String> = self.clips.iter().take(CLIPS_REPEATED).map(ToString::to_string).collect();
+        let repeated = if times > CLIPS_REPEATED {
             format!("--repeat {first} --clips {times}")
         } else {
             format!("--repeat {}", all.join(","))
         };
         let mut commands = vec![self.same(&repeated), self.same(&format!("--repeat {first} --speed 0.5"))];
-        if fast >= WORTH {
+        if fast >= WORTH_PLAYING_FASTER {
             commands.push(self.same(&format!("--repeat {first} --speed {fast}")));
         }
         (format!("{what} and add {speeds}"), Steps { commands, ..Steps::default() })

@@ -61,30 +61,30 @@ impl Verdict {
             Kind::Class | Kind::Unexplained => return Basis::Rate,
             Kind::NotTestable => return Basis::Nothing,
         };
-        if self.confidence < most - HAIR { Basis::Estimate } else { Basis::Limit }
+        if self.confidence < most - SHOWN_AS_THE_LIMIT { Basis::Estimate } else { Basis::Limit }
     }
 }
 
-/// So near its limit a confidence is shown as the limit.
-const HAIR: f64 = 0.005;
+/// So near its limit a confidence is shown as the limit [1]: half a percent, as it is printed.
+const SHOWN_AS_THE_LIMIT: f64 = 0.005;
 
 /// What is stronger than what is met in practice is believed where it explains this much [%]: a substitute does not.
-const ALL_BUT_EXACT: f64 = 99.5;
+const BELIEVED_BEYOND_RANGE: f64 = 99.5;
 
-/// What is less likely than not is not named.
-const LIKELY: f64 = 0.5;
+/// What is less likely than not is not named [1].
+const LEAST_CONFIDENCE: f64 = 0.5;
 
 impl Finding<'_> {
     pub(super) fn decide(&self) -> Decision {
         if self.within_tolerance[0] {
             return self.none();
         }
-        let unlikely = self.rivals.is_empty() && self.confidence < LIKELY;
+        let unlikely = self.rivals.is_empty() && self.confidence < LEAST_CONFIDENCE;
         if self.effects.is_empty() || !self.confirmed || unlikely {
             let gap = self.left.iter().any(|left| left.gaps() > 1.0);
             return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
         }
-        let pushed = self.implausible && self.percent() < ALL_BUT_EXACT;
+        let pushed = self.implausible && self.percent() < BELIEVED_BEYOND_RANGE;
         if pushed
             || !self.within_tolerance[1]
                 && self.left.iter().any(|left| left.too_much(self.clear) && !(left.of_object && self.moves_the_arm()))

@@ -18,7 +18,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Files for one answer at most: eight clips differ as much as more would.
-const MOST: usize = 8;
+const MOTIONS_WRITTEN: usize = 8;
 
 /// Plans the motions and writes each beside `answer`: `report_motion_1.csv` beside `report.html`. A file that is there already is
 /// kept, and another number taken, unless `force`. What cannot be planned says why.
@@ -26,7 +26,7 @@ const MOST: usize = 8;
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
 pub fn write(motions: &mut Vec<NextMotion>, session: &Session, answer: &Path, force: bool) -> Result<(), OutputError> {
-    let each = motions.iter().flat_map(|next| (0..next.motion.clips).map(|_| next.motion)).take(MOST);
+    let each = motions.iter().flat_map(|next| (0..next.motion.clips).map(|_| next.motion)).take(MOTIONS_WRITTEN);
     let mut written: Vec<NextMotion> = Vec::new();
     let mut number = 0;
     let planner = Planner::of(session);

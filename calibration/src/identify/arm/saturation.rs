@@ -10,15 +10,15 @@ use rayon::prelude::*;
 use twin::effects::Search;
 
 /// Limits that are tried, each this many times lower than the one before [1]...
-const RATIO: f64 = 1.4;
-/// ...from the highest that is met in practice [N m].
-const HIGHEST: f64 = 87.0;
+const LADDER_RATIO: f64 = 1.4;
+/// ...from the highest that an arm of this size has [N m]: joints 1 to 4 of an FR3.
+const HIGHEST_LIMIT: f64 = 87.0;
 /// A limit is there when it leaves less than this share of its joint's squared error.
-const BETTER: f64 = 0.9;
+const ERROR_LEFT_BY_A_LIMIT: f64 = 0.9;
 /// Iterations of the rough fit before.
-const ROUGH: usize = 4;
+const ROUGH_ITERATIONS: usize = 4;
 /// So many clips tell whether there is one.
-const CLIPS: usize = 3;
+const CLIPS_OF_THE_LADDER: usize = 3;
 
 /// Moves the start of each joint's limit, one after the other, to the best of a ladder; where none is better it stays without.
 pub(super) fn improve(
@@ -28,7 +28,7 @@ pub(super) fn improve(
     unknowns: &mut [Unknown],
     interrupt: &Interrupt,
 ) {
-    let clips = &train[..train.len().min(CLIPS)];
+    let clips = &train[..train.len().min(CLIPS_OF_THE_LADDER)];
     if settings.iter().all(|setting| limited(setting).is_none()) {
         return;
     }
@@ -41,13 +41,14 @@ pub(super) fn improve(
             numbers[k] = inverse;
             if interrupt.asked() { f64::INFINITY } else { costs(model, clips, &numbers)[joint] }
         };
-        let ladder: Vec<f64> = std::iter::successors(Some(HIGHEST.recip()), |inverse| Some(inverse * RATIO))
-            .take_while(|inverse| *inverse <= unknowns[k].upper)
-            .collect();
+        let ladder: Vec<f64> =
+            std::iter::successors(Some(HIGHEST_LIMIT.recip()), |inverse| Some(inverse * LADDER_RATIO))
+                .take_while(|inverse| *inverse <= unknowns[k].upper)
+                .collect();
         let tried: Vec<(f64, f64)> = ladder.into_par_iter().map(|inverse| (inverse, cost(inverse))).collect();
         let best = tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
         let without = cost(numbers[k]);
-        if let Some((inverse, _)) = best.filter(|(_, with)| *with < BETTER * without) {
+        if let Some((inverse, _)) = best.filter(|(_, with)| *with < ERROR_LEFT_BY_A_LIMIT * without) {
             unknowns[k].start = inverse;
         }
     }
@@ -56,13 +57,13 @@ pub(super) fn improve(
 /// Takes away limits without which the twin is as good where the search ended: they say nothing there, and elsewhere they
 /// would clip.
 pub(super) fn forget_unreached(model: &Model<'_>, settings: &[Setting], fit: &mut Fit) {
-    let clips: Vec<usize> = (0..model.clips().min(CLIPS)).collect();
+    let clips: Vec<usize> = (0..model.clips().min(CLIPS_OF_THE_LADDER)).collect();
     for (k, setting) in settings.iter().enumerate() {
         let Some(joint) = limited(setting).filter(|_| fit.shared[k] > 0.0) else { continue };
         let mut without = fit.shared.clone();
         without[k] = 0.0;
         let [with, none] = [&fit.shared, &without].map(|numbers| costs(model, &clips, numbers)[joint]);
-        if with >= BETTER * none {
+        if with >= ERROR_LEFT_BY_A_LIMIT * none {
             fit.shared = without;
         }
     }
@@ -81,7 +82,7 @@ fn bring_near(
         None => unknown.clone(),
     });
     let without: Vec<Unknown> = without.collect();
-    let schedule = Schedule::of(ROUGH);
+    let schedule = Schedule::of(ROUGH_ITERATIONS);
     let rough = fit(&Subset { model, clips }, &without, &model.random(), &schedule, |_, _| !interrupt.asked());
     // Where the twin cannot be simulated the search itself says so.
     for (unknown, near) in unknowns.iter_mut().zip(rough.map(|fit| fit.shared).unwrap_or_default()) {

@@ -10,9 +10,9 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 /// From the difference to half steps to the whole error of whole ones.
-const EXTRAPOLATED: f64 = 4.0 / 3.0;
+const RICHARDSON: f64 = 4.0 / 3.0;
 /// What of the error a robot, or a simulator in its place, may have itself: a quarter, as with half steps.
-const OPEN: f64 = 0.25;
+const SHARE_LEFT_OPEN: f64 = 0.25;
 
 /// How far the numbers of a fit to the clips in `train` move once the time step is taken out.
 ///
@@ -28,7 +28,7 @@ pub(super) fn error(
     let off = |(clip, linear): &(&usize, &ClipFit)| {
         let in_parts = |parts| model.residuals_in(parts, (**clip, &fit.shared, &linear.own));
         let (whole, mut halves) = (in_parts(1)?, in_parts(2)?);
-        halves.iter_mut().zip(&whole).for_each(|(half, whole)| *half = EXTRAPOLATED * (*half - whole));
+        halves.iter_mut().zip(&whole).for_each(|(half, whole)| *half = RICHARDSON * (*half - whole));
         Ok(halves)
     };
     let by = jobs.par_iter().map(off).collect::<Result<Vec<_>, _>>()?;
@@ -48,7 +48,7 @@ pub(super) fn taken_out(fit: &mut Fit, unknowns: &[Unknown], error: &[f64]) -> V
     for ((value, error), unknown) in fit.shared.iter_mut().zip(error).zip(unknowns) {
         *value = (*value + error).clamp(unknown.lower, unknown.upper);
     }
-    error.iter().map(|error| OPEN * error.abs()).collect()
+    error.iter().map(|error| SHARE_LEFT_OPEN * error.abs()).collect()
 }
 
 #[cfg(test)]

@@ -12,9 +12,9 @@ use inference::estimate::ClipFit;
 use std::collections::BTreeMap;
 
 /// Below so many motions the interval rests on how noisy the poses are: whether friction is the same each time remains open.
-const FEW: usize = 3;
-/// Residuals so many times the noise are no noise.
-const COARSE: f64 = 1.5;
+const MOTIONS_TO_COMPARE: usize = 3;
+/// Residuals so many times the noise are no noise (a choice).
+const BEYOND_NOISE: f64 = 1.5;
 
 /// `before` are the motions with what the URDF says, `held_out` each with what the others say.
 pub(super) fn answer(
@@ -130,13 +130,13 @@ fn warnings(material: &Material, motions: &[Motion], found: &Found) -> Vec<Strin
         motions[0].joint.inertia,
         if subject.joint.slides { "kg" } else { "kg m^2" }
     )];
-    if motions.len() < FEW {
+    if motions.len() < MOTIONS_TO_COMPARE {
         all.push(format!(
-            "only {} of the part: whether friction is the same each time remains open; record at least {FEW} pushes",
+            "only {} of the part: whether friction is the same each time remains open; record at least {MOTIONS_TO_COMPARE} pushes",
             if motions.len() == 1 { "one motion".to_owned() } else { format!("{} motions", motions.len()) }
         ));
     }
-    if found.fit.misfit().sqrt() > COARSE {
+    if found.fit.misfit().sqrt() > BEYOND_NOISE {
         all.push(format!(
             "what is left is {:.1} times the noise of the poses: this joint is not slowed by dry friction and damping alone, or not each \
              time alike; the intervals are as much wider",

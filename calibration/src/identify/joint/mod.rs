@@ -48,7 +48,7 @@ use twin::arm::{ModelError, with_files_found_from, with_joint_friction};
 use twin::world::LoneJoint;
 
 /// A part that rests nearer than this to the end of its joint's range may lie on a stop, as a share of the range.
-const AT_END: f64 = 0.02;
+const NEAR_A_STOP: f64 = 0.02;
 
 /// What to identify.
 #[derive(Debug, Clone, Default)]
@@ -169,7 +169,7 @@ impl OfClip {
         let joint = LoneJoint::new(&subject.joint, &subject.part, &clip.carrier);
         let motions = alone::motions(&clip, &joint, noise);
         let [low, high] = subject.joint.limits;
-        let edge = (AT_END * (high - low)).max(3.0 * noise.sigma);
+        let edge = (NEAR_A_STOP * (high - low)).max(3.0 * noise.sigma);
         let free = alone::rests(&clip, noise).into_iter().filter(|at| (low + edge..high - edge).contains(at));
         let holds = free.map(|at| [joint.load(at).abs(), at]).max_by(|a, b| a[0].total_cmp(&b[0]));
         Self { file, clip, motions, holds }

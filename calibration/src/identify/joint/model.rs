@@ -5,15 +5,16 @@
 use inference::estimate::{ClipModel, Fit, Impossible, Place, Random, Schedule, Unknown, fit_from};
 use twin::world::LoneJoint;
 
-/// One sigma of a motion's own start, in those of its noise.
-const FREE: f64 = 1e4;
-/// Difference steps: of the own start in sigmas of noise, of friction and damping as a share of what stops the part within the motion.
-const OWN_STEP: f64 = 0.1;
-const SHARED_STEP: f64 = 1e-3;
+/// Prior scatter of a motion's start, one sigma in those of its noise [1]: so wide that it says nothing (a choice).
+const START_SIGMA: f64 = 1e4;
+/// Difference steps (choices): of the start in sigmas of noise, of friction and damping as a share of what stops the part within the
+/// motion.
+const START_STEP: f64 = 0.1;
+const FRICTION_STEP: f64 = 1e-3;
 
 /// Witnesses of the intervals in a motion: what residuals of neighbouring rows share, by noise that lasts or a law that is not quite
-/// theirs, counts once.
-const STRETCHES: usize = 5;
+/// theirs, counts once (a choice).
+const WITNESSES: usize = 5;
 
 /// A part that moves by itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +30,7 @@ pub(super) struct Motion {
 }
 
 /// Fewest rows from which a start is read.
-const FIRST: usize = 3;
+const ROWS_OF_A_START: usize = 3;
 
 impl Motion {
     pub(super) fn duration(&self) -> f64 {
@@ -52,7 +53,7 @@ impl Motion {
 
     /// Where a fit of its start begins: a line through its first rows.
     fn start(&self) -> [f64; 2] {
-        let rows = (self.times.len() / 8).max(FIRST).min(self.times.len());
+        let rows = (self.times.len() / 8).max(ROWS_OF_A_START).min(self.times.len());
         let (times, positions) = (&self.times[..rows], &self.positions[..rows]);
         let mean = |values: &[f64]| values.iter().sum::<f64>() / rows as f64;
         let (t, q) = (mean(times), mean(positions));
@@ -105,7 +106,7 @@ impl Motions<'_> {
             start: 0.3 * whole[k],
             lower: 0.0,
             upper: upper[k] + more,
-            step: SHARED_STEP * whole[k],
+            step: FRICTION_STEP * whole[k],
         };
         [unknown("dry_friction", 0, 2.0 * held), unknown("viscous_friction", 1, 0.0)]
     }
@@ -114,8 +115,8 @@ impl Motions<'_> {
     pub(super) fn own() -> [Random; 2] {
         ["position at the start", "velocity at the start"].map(|name| Random {
             name: name.into(),
-            sigma: FREE,
-            step: OWN_STEP,
+            sigma: START_SIGMA,
+            step: START_STEP,
         })
     }
 }
@@ -127,7 +128,7 @@ impl ClipModel for Motions<'_> {
 
     fn stretches(&self, clip: usize) -> Vec<usize> {
         let rows = self.0[clip].times.len();
-        (1..=STRETCHES).map(|k| rows * k / STRETCHES).collect()
+        (1..=WITNESSES).map(|k| rows * k / WITNESSES).collect()
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {

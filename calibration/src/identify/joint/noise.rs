@@ -4,19 +4,19 @@
 use inference::statistics::median;
 
 /// Rows of a window in which a part may rest.
-const WINDOW: usize = 30;
+const ROWS_OF_A_WINDOW: usize = 30;
 /// A window is one of rest if its rows scatter by at most so many times what changes from row to row.
-const RESTS: f64 = 3.0;
+const SCATTER_AT_REST: f64 = 3.0;
 /// Degree of a smooth curve through a window in which it moves.
-const CURVE: usize = 3;
+const DEGREE_OF_A_CURVE: usize = 3;
 /// Fewest windows of rest that say something.
-const FEWEST: usize = 3;
+const FEWEST_WINDOWS: usize = 3;
 /// A median absolute deviation is so many standard deviations of a normal distribution.
-const MEDIAN: f64 = 0.674_49;
+const MEDIAN_DEVIATION_OF_NORMAL: f64 = 0.674_49;
 /// Of the third difference of independent rows: the root of 1 + 9 + 9 + 1.
-const THIRD: f64 = 4.472_136;
+const SIGMA_OF_A_THIRD_DIFFERENCE: f64 = 4.472_136;
 /// What lasts keeps at most this share from row to row.
-const MOST_KEPT: f64 = 0.9;
+const LARGEST_SHARE_KEPT: f64 = 0.9;
 /// Rounds in which the share that windows lose is found.
 const ROUNDS: usize = 5;
 
@@ -33,13 +33,17 @@ impl Noise {
     /// Of the positions of several clips.
     pub(super) fn of<'a>(clips: impl Iterator<Item = &'a [f64]> + Clone) -> Self {
         let thirds = clips.clone().flat_map(|rows| rows.windows(4).map(|w| (w[3] - 3.0 * (w[2] - w[1]) - w[0]).abs()));
-        let white = median(thirds).unwrap_or(0.0) / MEDIAN / THIRD;
-        let windows: Vec<&[f64]> = clips.flat_map(|rows| rows.chunks_exact(WINDOW)).collect();
+        let white = median(thirds).unwrap_or(0.0) / MEDIAN_DEVIATION_OF_NORMAL / SIGMA_OF_A_THIRD_DIFFERENCE;
+        let windows: Vec<&[f64]> = clips.flat_map(|rows| rows.chunks_exact(ROWS_OF_A_WINDOW)).collect();
         let of = |degree: usize| windows.iter().map(move |window| covariances(window, degree)).collect::<Vec<_>>();
         let resting: Vec<[f64; 3]> =
-            of(0).into_iter().filter(|[variance, ..]| variance.sqrt() <= RESTS * white).collect();
+            of(0).into_iter().filter(|[variance, ..]| variance.sqrt() <= SCATTER_AT_REST * white).collect();
         // Where the part hardly ever rests, what is left beside smooth curves.
-        let (all, taken) = if resting.len() >= FEWEST { (resting, 1.0) } else { (of(CURVE), CURVE as f64 + 1.0) };
+        let (all, taken) = if resting.len() >= FEWEST_WINDOWS {
+            (resting, 1.0)
+        } else {
+            (of(DEGREE_OF_A_CURVE), DEGREE_OF_A_CURVE as f64 + 1.0)
+        };
         if all.is_empty() {
             return Self { sigma: white, lasts: 1.0 };
         }
@@ -53,12 +57,12 @@ impl Noise {
         for _ in 0..ROUNDS {
             // The mean of a window is taken off, and with it this share of every covariance. Of curves the share is that of white noise:
             // how much they take of noise that lasts is not identifiable from a few rows.
-            let lost = if taken > 1.0 { taken } else { noise.lasts } / WINDOW as f64;
+            let lost = if taken > 1.0 { taken } else { noise.lasts } / ROWS_OF_A_WINDOW as f64;
             let whole = variance / (1.0 - lost).max(0.5);
             let [first, second] = [first, second].map(|covariance| covariance / whole + lost);
             // A part that is white, and one that dies away by the same share from row to row.
-            let keeps = if first > 0.0 { (second / first).clamp(0.0, MOST_KEPT) } else { 0.0 };
-            noise.lasts = (1.0 + 2.0 * first.max(0.0) / (1.0 - keeps)).min(0.5 * WINDOW as f64);
+            let keeps = if first > 0.0 { (second / first).clamp(0.0, LARGEST_SHARE_KEPT) } else { 0.0 };
+            noise.lasts = (1.0 + 2.0 * first.max(0.0) / (1.0 - keeps)).min(0.5 * ROWS_OF_A_WINDOW as f64);
             noise.sigma = white.max(whole.sqrt());
         }
         noise

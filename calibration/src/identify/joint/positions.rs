@@ -9,12 +9,12 @@ use twin::scene::joint_position;
 
 /// A part that the poses show so far beside its joint is not on it [m, rad]: its frame is another one than the URDF's. Gravity pulls
 /// by the angle from the URDF's zero, so what is turned by more leaves another friction.
-const BESIDE: f64 = 0.03;
-const TURNED: f64 = 0.15;
+const OFF_THE_JOINT: f64 = 0.03;
+const TURNED_OFF_THE_JOINT: f64 = 0.15;
 /// A pose of the carrier counts for so long before its first and after its last stamp [s].
-const AROUND: f64 = 0.2;
+const CARRIER_POSE_HOLDS: f64 = 0.2;
 /// Fewest rows of use.
-const FEWEST: usize = 10;
+const FEWEST_ROWS: usize = 10;
 
 /// A joint over a clip.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,12 +60,12 @@ impl Positions {
             beside.push(off.translation.vector.norm());
             turned.push(off.rotation.angle());
         }
-        if positions.len() < FEWEST {
+        if positions.len() < FEWEST_ROWS {
             let [a, b] = &subject.bodies;
             return Err(format!("has only {} poses of `{b}` while `{a}` is seen, too", positions.len()));
         }
         let [beside, turned] = [beside, turned].map(|values| median(values).unwrap_or(0.0));
-        if beside > BESIDE || turned > TURNED {
+        if beside > OFF_THE_JOINT || turned > TURNED_OFF_THE_JOINT {
             return Err(format!(
                 "shows `{}` {:.0} mm and {:.0} degrees beside its joint; give poses in the frames of the URDF's links",
                 subject.bodies[1],
@@ -82,7 +82,8 @@ impl Positions {
 fn between(series: &ObjectSeries, stamp: u64) -> Option<Isometry3<f64>> {
     let pose = |row: usize| series.poses[row].isometry();
     let after = series.stamps_ns.partition_point(|other| *other < stamp);
-    let near = |row: usize| (series.stamps_ns[row].abs_diff(stamp) as f64 * 1e-9 <= AROUND).then(|| pose(row));
+    let near =
+        |row: usize| (series.stamps_ns[row].abs_diff(stamp) as f64 * 1e-9 <= CARRIER_POSE_HOLDS).then(|| pose(row));
     if after == 0 {
         return near(0);
     }

@@ -10,14 +10,14 @@ use twin::metrics::SurfacePoints;
 use twin::scene::ObjectShape;
 
 /// Poses of a clip that count, evenly spaced: more do not move the mean.
-const POSES: usize = 40;
+const POSES_OF_A_CLIP: usize = 40;
 
 /// A simulated pose in the measured object's frame: how far it lies off [m] and its turn [rad], axis times angle.
 pub(super) type Slip = Vector6<f64>;
 
 /// Of how many poses of a clip one counts.
 fn every(poses: usize) -> usize {
-    poses.div_ceil(POSES).max(1)
+    poses.div_ceil(POSES_OF_A_CLIP).max(1)
 }
 
 /// Clips, judged by their surface's points alone.
