@@ -1,9 +1,8 @@
 //! Which verbs each clip is good for, by the rules by which these admit clips, and what is missing for a verb.
 
 use super::remark::{Remark, Severity};
-use crate::identify::arm::ArmError;
-use crate::identify::object::ObjectError;
 use inference::likelihood::arm::ArmClips;
+use crate::identify::IdentifyError;
 use inference::admit::admit;
 use inference::admit::look::{for_diagnosis, for_object};
 use inference::admit::remarks::grouped;
@@ -123,7 +122,7 @@ impl Rules {
     fn identify_arm(&self, cell: &Cell, clip: &Clip) -> Answer {
         let lacks = [(cell.robot.is_none(), "[robot]"), (cell.controller.is_none(), "[controller]")];
         if let Some((_, block)) = lacks.into_iter().find(|(lacks, _)| *lacks) {
-            return Err(ArmError::NoArm(block).to_string());
+            return Err(IdentifyError::NoArm(block).to_string());
         }
         if clip.kind == ClipKind::FreeMotion {
             return Err("no arm moves in it".into());
@@ -136,7 +135,7 @@ impl Rules {
 
     fn identify_object(&self, cell: &Cell, clip: &Clip) -> Answer {
         if cell.object().is_none() {
-            return Err(ObjectError::NoObject.to_string());
+            return Err(IdentifyError::NoObject.to_string());
         }
         if clip.kind == ClipKind::Excitation {
             return Err("no object moves in it".into());
@@ -156,7 +155,7 @@ impl Rules {
             };
         }
         if session.cell.robot.is_none() {
-            return Err(ArmError::NoArm("[robot]").to_string());
+            return Err(IdentifyError::NoArm("[robot]").to_string());
         }
         if of == ClipKind::ControlHitSlide && clip.kind != of {
             return Err("no object is hit in it".into());

@@ -7,11 +7,12 @@
 //! | [`object`] | friction, mass, centre of mass and tip friction of the object |
 //! | [`joint`] | friction and damping of a hinge or a slide of an object that moves in itself |
 //! | `used` | which clips are fitted, held out, left out |
-//! | `options` | what an arm or an object is identified from, and how |
+//! | `options`, `error` | what an arm or an object is identified from, and how; why it cannot be |
 //! | `finding`, `figures` | a fit number by number; how far the twin is off over sets of clips |
 //! | `run` | the way of searching, its progress, its interruption and resumption |
 
 pub mod arm;
+mod error;
 mod figures;
 mod finding;
 pub mod joint;
@@ -23,5 +24,6 @@ mod test_finding;
 mod used;
 
 pub use crate::answer::identification::Identification;
+pub use error::IdentifyError;
 pub use options::Options;
 pub use run::Optimizer;

@@ -1,6 +1,7 @@
 //! One search over clips: by least squares or without slopes, with a bar, and so that Ctrl-C loses nothing: every step is kept
 //! ([`Kept`]), and the same command goes on from there to the same answer.
 
+use super::error::IdentifyError;
 use crate::answer::identification::Identification;
 use inference::estimate::search;
 use inference::estimate::{
@@ -9,7 +10,6 @@ use inference::estimate::{
 };
 use inference::interrupt::Interrupt;
 use inference::kept::{Fingerprint, Kept};
-use shared_mem::output::OutputError;
 use shared_mem::progress::Progress;
 use shared_mem::theta::Theta;
 use shared_mem::typed;
@@ -54,7 +54,8 @@ pub(super) struct Run<'a> {
     pub(super) seed: u64,
     /// Points whose cost a search without slopes may ask for.
     pub(super) budget: usize,
-    pub(super) work: Work<'a>,
+    pub(super) kept: &'a Kept,
+    pub(super) interrupt: &'a Interrupt,
 }
 
 /// The end of a search.
@@ -66,16 +67,6 @@ pub(super) struct Outcome {
     pub(super) arrived: bool,
 }
 
-/// A search ended without an answer.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
-    Impossible(#[from] Impossible),
-    /// Ctrl-C. What was found is kept, and the words say where.
-    #[error("{0}")]
-    Interrupted(String),
-}
-
 /// Steps of a search, by name.
 fn step(name: &str) -> Fingerprint {
     Fingerprint::of(name)
@@ -83,13 +74,13 @@ fn step(name: &str) -> Fingerprint {
 
 impl Run<'_> {
     /// Searches; `model` has the clips to be fitted, `first` those of them that a rough fit may begin with.
-    pub(super) fn search<M: ClipModel>(&self, model: &M, first: &impl ClipModel) -> Result<Outcome, RunError> {
+    pub(super) fn search<M: ClipModel>(&self, model: &M, first: &impl ClipModel) -> Result<Outcome, IdentifyError> {
         let per_point = model.clips();
         let expected = match self.optimizer {
             Optimizer::LeastSquares => USUAL_LINEARISATIONS * (1 + self.unknowns.len()) * per_point,
             _ => self.budget * per_point,
         };
-        let watch = Watch::new(expected, self.work.interrupt);
+        let watch = Watch::new(expected, self.interrupt);
         let outcome = match self.optimizer {
             Optimizer::LeastSquares => self.least_squares(&watch, model, first),
             Optimizer::Swarm => {
@@ -101,7 +92,7 @@ impl Run<'_> {
                 self.without_slopes(&watch, model, evolution)
             }
         };
-        stopped(self.work)?;
+        stopped(Work { kept: self.kept, interrupt: self.interrupt })?;
         outcome
     }
 
@@ -110,19 +101,18 @@ impl Run<'_> {
         watch: &Watch<'_>,
         model: &M,
         first: &impl ClipModel,
-    ) -> Result<Outcome, RunError> {
+    ) -> Result<Outcome, IdentifyError> {
         let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
         let at_rest = |shared, clips| Place::at_rest(shared, self.random, clips);
         let all = Watched { model, watch };
         type Way = (Underway, Vec<[f64; 2]>);
-        let (now, way): Way = match self.work.kept.known(&step("way")) {
+        let (now, way): Way = match self.kept.known(&step("way")) {
             Some(known) => known,
             None => {
                 let start = if first.clips() < model.clips() {
                     let few = Watched { model: first, watch };
                     let (from, schedule) = (at_rest(start, first.clips()), Schedule::of(FIRST));
-                    fit_from(&few, self.unknowns, self.random, from, &schedule, |_, _| !self.work.interrupt.asked())?
-                        .shared
+                    fit_from(&few, self.unknowns, self.random, from, &schedule, |_, _| !self.interrupt.asked())?.shared
                 } else {
                     start
                 };
@@ -138,8 +128,8 @@ impl Run<'_> {
             if way.len() < now.fit.history.len() {
                 way.push([watch.simulated() as f64, now.fit.deviance()]);
             }
-            self.work.kept.keep(&step("way"), &(now, &*way));
-            !self.work.interrupt.asked()
+            self.kept.keep(&step("way"), &(now, &*way));
+            !self.interrupt.asked()
         })?;
         let rows = fit.clips.iter().map(|clip| clip.rows).sum::<usize>().max(1) as f64;
         let mut convergence = way.into_inner().expect("no holder panics");
@@ -153,9 +143,9 @@ impl Run<'_> {
         watch: &Watch<'_>,
         model: &M,
         mut search: impl Search,
-    ) -> Result<Outcome, RunError> {
+    ) -> Result<Outcome, IdentifyError> {
         let all = Watched { model, watch };
-        let answers: Vec<Vec<f64>> = self.work.kept.known(&step("answers")).unwrap_or_default();
+        let answers: Vec<Vec<f64>> = self.kept.known(&step("answers")).unwrap_or_default();
         watch.already(answers.iter().map(Vec::len).sum::<usize>() * model.clips());
         let mut so_far = answers.clone();
         let found: Found = minimise(
@@ -165,11 +155,11 @@ impl Run<'_> {
             &answers,
             |x| self.cost(&all, x),
             |costs, _| {
-                if self.work.interrupt.asked() {
+                if self.interrupt.asked() {
                     return false;
                 }
                 so_far.push(costs.to_vec());
-                self.work.kept.keep(&step("answers"), &so_far);
+                self.kept.keep(&step("answers"), &so_far);
                 true
             },
         );
@@ -214,17 +204,17 @@ impl<'a> Work<'a> {
 }
 
 /// Whether the user asked for the end: then what was found so far is taken to its file.
-pub(super) fn stopped(Work { kept, interrupt }: Work<'_>) -> Result<(), RunError> {
-    if interrupt.asked() { Err(RunError::Interrupted(kept.farewell(&typed::command()))) } else { Ok(()) }
+pub(super) fn stopped(Work { kept, interrupt }: Work<'_>) -> Result<(), IdentifyError> {
+    if interrupt.asked() { Err(IdentifyError::Interrupted(kept.farewell(&typed::command()))) } else { Ok(()) }
 }
 
 /// The answer of work whose steps were kept, once its parameters are in their file; then nothing needs to be kept any more.
-pub(super) fn concluded<E: From<RunError> + From<OutputError>>(
-    found: Result<(Identification, Theta), E>,
+pub(super) fn concluded(
+    found: Result<(Identification, Theta), IdentifyError>,
     out: Option<&Path>,
     began: Instant,
     work: Work<'_>,
-) -> Result<Identification, E> {
+) -> Result<Identification, IdentifyError> {
     let Work { kept, interrupt } = work;
     interrupt.work_is_over();
     // What work says that was cut short is no answer.

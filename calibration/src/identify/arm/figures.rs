@@ -1,10 +1,10 @@
 //! How far the twin is off: clip by clip and for each set of clips, with what was found and with what was known before.
 
-use super::{ArmError, Model};
+use super::Model;
 use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Figures, Identification};
+use crate::identify::error::IdentifyError;
 use crate::identify::figures::{FITTED, HELD_OUT, Odd, gap, odd};
-use crate::identify::run::RunError;
 use inference::estimate::{Random, Schedule, Subset, score};
 use crate::identify::used::Used;
 use rayon::prelude::*;
@@ -29,13 +29,13 @@ pub(super) fn fill(
     clips: &Used,
     random: &[Random],
     numbers: [&[f64]; 2],
-) -> Result<(), ArmError> {
+) -> Result<(), IdentifyError> {
     let train = clips.split.train.iter().map(|clip| (*clip, FITTED));
     let jobs: Vec<(usize, &str)> = train.chain(clips.split.confirm.iter().map(|clip| (*clip, HELD_OUT))).collect();
     let done: Vec<(ClipGap, Trace)> = jobs
         .par_iter()
         .map(|(clip, used)| one(model, *clip, used, random, numbers))
-        .collect::<Result<_, RunError>>()?;
+        .collect::<Result<_, IdentifyError>>()?;
     (answer.by_clip, answer.traces) = done.into_iter().unzip();
     answer.gap = gap(&answer.by_clip);
     answer.warnings.extend(odd_clips(&answer.by_clip));
@@ -61,7 +61,7 @@ fn one(
     used: &str,
     random: &[Random],
     [before, after]: [&[f64]; 2],
-) -> Result<(ClipGap, Trace), RunError> {
+) -> Result<(ClipGap, Trace), IdentifyError> {
     // What was known before may be beyond what can be simulated: then there is no figure.
     let before = errors(model, clip, random, before).ok();
     let after = errors(model, clip, random, after)?;
@@ -86,7 +86,7 @@ fn one(
     Ok((gap, trace))
 }
 
-fn errors(model: &Model<'_>, clip: usize, random: &[Random], numbers: &[f64]) -> Result<Errors, RunError> {
+fn errors(model: &Model<'_>, clip: usize, random: &[Random], numbers: &[f64]) -> Result<Errors, IdentifyError> {
     let own = if random.iter().any(|effect| effect.sigma > 0.0) {
         let alone = Subset { model, clips: &[clip] };
         score(&alone, numbers, random, &Schedule::default())?.swap_remove(0).own

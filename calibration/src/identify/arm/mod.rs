@@ -16,14 +16,16 @@ mod session;
 mod time_step;
 mod verdict;
 
+use super::error::IdentifyError;
 use super::finding::Finding;
 pub use super::options::Options;
-use super::run::{Outcome, Run, RunError, Work, concluded};
+use super::run::{Outcome, Run, Work, concluded};
 use super::used::Used;
 use crate::answer::identification::Identification;
-use inference::controller::{ControllerError, controlled, start};
+use inference::controller::{controlled, start};
 use inference::engine;
 use inference::estimate::{Intervals, Random, Subset, Unknown, at_bounds};
+
 use inference::interrupt::Interrupt;
 use inference::kept;
 use inference::kept::Fingerprint;
@@ -32,54 +34,11 @@ use inference::likelihood::setting::{BaseError, arm_numbers, complete, effect_se
 use inference::likelihood::{Setting, Settings};
 use session::Material;
 use shared_mem::cell::Cell;
-use shared_mem::output::OutputError;
-use shared_mem::recording::{Clip, ReadError, SessionFiles};
+use shared_mem::recording::{Clip, SessionFiles};
 use shared_mem::theta::Theta;
-use shared_mem::toml_file::TomlFileError;
 use std::time::Instant;
-use twin::arm::{ArmModel, ModelError};
+use twin::arm::ArmModel;
 use twin::effects::{EffectInfo, Robot, Stage, find, registry};
-
-/// The arm cannot be identified.
-#[derive(Debug, thiserror::Error)]
-pub enum ArmError {
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// The parameters that are known already.
-    #[error(transparent)]
-    Theta(#[from] TomlFileError),
-    #[error(transparent)]
-    Base(#[from] BaseError),
-    /// The arm's model.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// What leads the arm.
-    #[error(transparent)]
-    Controller(#[from] ControllerError),
-    /// There is nothing to identify.
-    #[error("cell.toml has no {0} block; add it, or identify the object")]
-    NoArm(&'static str),
-    /// No such effect on an arm.
-    #[error("--also {given}: no effect on the arm is called so; there are {known}")]
-    Effect {
-        /// The name given.
-        given: String,
-        /// The names there are.
-        known: String,
-    },
-    /// Nothing can be used.
-    #[error("{session}: no clip can be used for the arm: {why}")]
-    NoClip {
-        session: String,
-        /// Reasons, clip by clip.
-        why: String,
-    },
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// The answer cannot be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-}
 
 /// Said where a search ended with its budget or was stopped.
 const UNFINISHED: &str = "the search ended before it arrived: values and intervals are those of the place where it stopped; give more \
@@ -93,8 +52,8 @@ type Model<'a> = ArmClips<Numbers<'a>>;
 /// Identifies the arm of a session; writes theta.toml where `out` says, with everything that was known before.
 ///
 /// # Errors
-/// [`ArmError`] naming file, key or clip, and the remedy.
-pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, ArmError> {
+/// [`IdentifyError`] naming file, key or clip, and the remedy.
+pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, IdentifyError> {
     identify_material(session::open(&options.session, options.cell.as_deref())?, options, interrupt)
 }
 
@@ -107,14 +66,18 @@ pub fn identify_clips(
     clips: Vec<Clip>,
     options: &Options,
     interrupt: &Interrupt,
-) -> Result<Identification, ArmError> {
+) -> Result<Identification, IdentifyError> {
     identify_material(Material { cell: cell.clone(), clips, left_out: Vec::new() }, options, interrupt)
 }
 
-fn identify_material(material: Material, options: &Options, interrupt: &Interrupt) -> Result<Identification, ArmError> {
+fn identify_material(
+    material: Material,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Identification, IdentifyError> {
     let began = Instant::now();
     if material.cell.robot.is_none() || material.cell.controller.is_none() {
-        return Err(ArmError::NoArm(if material.cell.robot.is_none() { "[robot]" } else { "[controller]" }));
+        return Err(IdentifyError::NoArm(if material.cell.robot.is_none() { "[robot]" } else { "[controller]" }));
     }
     let given = options.parameters.as_deref().map(Theta::read).transpose()?;
     let question = Fingerprint::of("identify arm")
@@ -135,7 +98,7 @@ fn identify_kept(
     given: Option<&Theta>,
     options: &Options,
     work: Work<'_>,
-) -> Result<(Identification, Theta), ArmError> {
+) -> Result<(Identification, Theta), IdentifyError> {
     let Work { kept, interrupt } = work;
     let mut remarks = Vec::new();
     let cell = controlled(cell, &clips, given, &mut remarks, interrupt)?;
@@ -167,7 +130,7 @@ fn identify_kept(
     let error = kept.once_if_ok(&Fingerprint::of("time step"), || {
         time_step::error(&model, &clips.split.train, (&unknowns, &random), &outcome.fit)
     });
-    let open = time_step::taken_out(&mut outcome.fit, &unknowns, &error.map_err(RunError::Impossible)?);
+    let open = time_step::taken_out(&mut outcome.fit, &unknowns, &error?);
     saturation::forget_unreached(&model, settings.settings(), &mut outcome.fit);
     let held = at_bounds(&unknowns, &outcome.fit.shared);
     let mut intervals = Intervals::new(&outcome.fit, &held);
@@ -205,7 +168,7 @@ fn identify_kept(
 }
 
 /// Gains, and the parameters of the effects that were asked for.
-fn searched(cell: &Cell, base: &Theta, also: &[String]) -> Result<Vec<(Setting, Unknown)>, ArmError> {
+fn searched(cell: &Cell, base: &Theta, also: &[String]) -> Result<Vec<(Setting, Unknown)>, IdentifyError> {
     let mut all = arm_numbers(cell, base);
     let dof = base.arm.as_ref().map_or(0, |arm| arm.stiffness.len());
     let robot = Robot::of(&ArmModel::from_cell(cell)?);
@@ -213,7 +176,7 @@ fn searched(cell: &Cell, base: &Theta, also: &[String]) -> Result<Vec<(Setting, 
         let on_arm = |effect: &&EffectInfo| effect.stage == Stage::Control;
         let effect = find(name).filter(|effect| on_arm(effect)).ok_or_else(|| {
             let known: Vec<&str> = registry().iter().filter(on_arm).map(|effect| effect.name).collect();
-            ArmError::Effect { given: name.clone(), known: known.join(", ") }
+            IdentifyError::Effect { given: name.clone(), known: known.join(", ") }
         })?;
         let asked = effect_settings(effect, &robot, dof).into_iter();
         let new: Vec<_> = asked.filter(|(asked, _)| all.iter().all(|(setting, _)| setting != asked)).collect();
@@ -228,11 +191,20 @@ fn search(
     clips: &Used,
     (unknowns, random): (&[Unknown], &[Random]),
     work: Work<'_>,
-) -> Result<Outcome, ArmError> {
-    let run = Run { unknowns, random, optimizer: options.optimizer, seed: options.seed, budget: options.budget, work };
+) -> Result<Outcome, IdentifyError> {
+    let Work { kept, interrupt } = work;
+    let run = Run {
+        unknowns,
+        random,
+        optimizer: options.optimizer,
+        seed: options.seed,
+        budget: options.budget,
+        kept,
+        interrupt,
+    };
     let train = &clips.split.train;
     let all = Subset { model, clips: train };
     // A rough fit to a third of the clips brings the rest near for a third of the price.
     let first = Subset { model, clips: &train[..train.len().div_ceil(3)] };
-    Ok(run.search(&all, &first)?)
+    run.search(&all, &first)
 }

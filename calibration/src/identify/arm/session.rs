@@ -1,6 +1,7 @@
 //! The clips of a session in which the arm moves, and joints that stand still in them.
 
-use super::{ArmError, Model};
+use super::Model;
+use crate::identify::error::IdentifyError;
 use crate::identify::used::Used;
 use inference::admit::remarks::reasons;
 use inference::admit::{self, Looked};
@@ -33,12 +34,12 @@ pub(super) fn used(
     mut left_out: Vec<admit::LeftOut>,
     unusable: Vec<LeftOut>,
     seed: u64,
-) -> Result<Used, ArmError> {
+) -> Result<Used, IdentifyError> {
     left_out.extend(unusable.into_iter().map(|clip| admit::LeftOut { file: clip.file, why: clip.why.to_string() }));
     if model.clips() == 0 {
         let reasons = reasons(&left_out);
         let why = if reasons.is_empty() { "it lists none with an arm".into() } else { reasons };
-        return Err(ArmError::NoClip { session: path.display().to_string(), why });
+        return Err(IdentifyError::NoClip { session: path.display().to_string(), target: "arm", why });
     }
     let all: Vec<_> = (0..model.clips()).map(|clip| model.clip(clip)).collect();
     let all: Vec<(String, &Clip)> = all.into_iter().map(|clip| (clip.name(), &clip.recorded)).collect();

@@ -8,8 +8,9 @@ use super::fit::{fit_object, usual_evaluations};
 use super::material::Material;
 use super::paper::SurfaceLoss;
 use super::polish::{fit_polished, fit_poses_alone};
-use super::{ObjectError, Options, Problem};
+use super::{Options, Problem};
 use crate::answer::identification::Figures;
+use crate::identify::error::IdentifyError;
 use crate::identify::run::{Optimizer, Run, Work, stopped};
 use inference::estimate::{ClipModel as _, Unknown};
 use inference::interrupt::Interrupt;
@@ -64,8 +65,8 @@ pub struct Method {
 /// Runs all of them.
 ///
 /// # Errors
-/// [`ObjectError`] naming what is wrong and the remedy.
-pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, ObjectError> {
+/// [`IdentifyError`] naming what is wrong and the remedy.
+pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, IdentifyError> {
     let material = Material::open(options)?;
     let problem = Problem::new(&material, options, Work::passing(interrupt))?;
     let without: Vec<usize> = (0..problem.unknowns.len())
@@ -125,7 +126,7 @@ fn sloped(
     material: &Material,
     searcher: Searcher,
     interrupt: &Interrupt,
-) -> Result<Method, ObjectError> {
+) -> Result<Method, IdentifyError> {
     let mut clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
     let start: Vec<f64> = problem.unknowns.iter().map(|unknown| unknown.start).collect();
     let (began, steps) = (Instant::now(), Mutex::new(Vec::new()));
@@ -153,7 +154,7 @@ fn sloped(
     let equal = vec![1.0; loss.clips()];
     let way = steps.into_inner().expect("no holder panics");
     let way = way.into_iter().map(|(numbers, n, at)| Ok((n, at, loss.mean(&numbers, &equal)?)));
-    let way = way.collect::<Result<Vec<_>, ObjectError>>()?;
+    let way = way.collect::<Result<Vec<_>, IdentifyError>>()?;
     let last = loss.mean(&numbers, &equal)?;
     finished(name, problem, material, &numbers, (evaluations, seconds, last, way))
 }
@@ -165,7 +166,7 @@ fn slopeless(
     material: &Material,
     options: &Options,
     interrupt: &Interrupt,
-) -> Result<Method, ObjectError> {
+) -> Result<Method, IdentifyError> {
     let clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
     let shape = problem.shape(&clips)?;
     let loss = SurfaceLoss::new(&clips, &shape);
@@ -175,7 +176,8 @@ fn slopeless(
         optimizer,
         seed: options.seed,
         budget: options.budget,
-        work: Work::passing(interrupt),
+        kept: Kept::nothing(),
+        interrupt,
     };
     let began = Instant::now();
     let outcome = run.search(&loss, &loss)?;
@@ -201,7 +203,7 @@ fn finished(
     material: &Material,
     numbers: &[f64],
     (evaluations, seconds, loss_m, way): Course,
-) -> Result<Method, ObjectError> {
+) -> Result<Method, IdentifyError> {
     let theta = problem.settings.theta(numbers);
     let (gaps, _) = gaps(material, &theta, (None, &theta))?;
     let mean = |of: &[usize]| Figures::mean(&of.iter().map(|clip| figures(&gaps[*clip])).collect::<Vec<_>>());

@@ -1,9 +1,9 @@
 //! How far the twin is off in every clip, by the figures of `twin replay`.
 
-use super::ObjectError;
 use super::material::Material;
 use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Figures, Identification};
+use crate::identify::error::IdentifyError;
 use crate::identify::figures::{FITTED, HELD_OUT, gap};
 use inference::engine::Engine;
 use inference::likelihood::object::Replays;
@@ -26,7 +26,7 @@ pub(super) fn fill(
     material: &Material,
     [before, after]: [&Theta; 2],
     by: By<'_>,
-) -> Result<(), ObjectError> {
+) -> Result<(), IdentifyError> {
     let ((before, paths_before), (after, paths_after)) = (gaps(material, before, by)?, gaps(material, after, by)?);
     let files = material.usable.iter().map(|usable| usable.file.as_str());
     let paths = paths_before.into_iter().zip(paths_after);
@@ -71,9 +71,9 @@ fn traces(file: &str, material: &Material, (before, after): (Path, Path)) -> imp
 }
 
 /// Gap of every clip, and what is left of its object's path.
-pub(super) fn gaps(material: &Material, theta: &Theta, by: By<'_>) -> Result<(Vec<Gap>, Vec<Path>), ObjectError> {
+pub(super) fn gaps(material: &Material, theta: &Theta, by: By<'_>) -> Result<(Vec<Gap>, Vec<Path>), IdentifyError> {
     let replays = Replays::new(&material.cell, theta, by)?;
-    let replayed = |usable: &inference::admit::Usable| -> Result<(Gap, Path), ObjectError> {
+    let replayed = |usable: &inference::admit::Usable| -> Result<(Gap, Path), IdentifyError> {
         let (clip, prediction, report) = replays.replay(usable.clip.clone())?;
         Ok((report.gap, path(&clip, &prediction)))
     };

@@ -1,8 +1,9 @@
 //! A session's clips with an object, sorted by their use.
 
-use super::{ObjectError, Options};
+use super::Options;
 use inference::likelihood::arm::one_piece;
 use shared_mem::cell::{Cell, ClipKind};
+use crate::identify::error::IdentifyError;
 use crate::identify::used::Used;
 use inference::admit::look::for_object;
 use inference::admit::remarks::reasons;
@@ -21,7 +22,7 @@ pub(super) struct Material {
 }
 
 impl Material {
-    pub(super) fn open(options: &Options) -> Result<Self, ObjectError> {
+    pub(super) fn open(options: &Options) -> Result<Self, IdentifyError> {
         let mut session = Session::open_with(&options.session, options.cell.as_deref())?;
         if let Some(subject) = session.about(options.object.as_deref())? {
             console::line(subject);
@@ -33,22 +34,26 @@ impl Material {
     }
 
     /// Of clips in memory.
-    pub(super) fn of_clips(cell: Cell, clips: Vec<Clip>, options: &Options) -> Result<Self, ObjectError> {
+    pub(super) fn of_clips(cell: Cell, clips: Vec<Clip>, options: &Options) -> Result<Self, IdentifyError> {
         let arm = arm_of(&cell)?;
         let looked = Looked::of_clips(clips, |clip| for_object(clip, &cell, arm.as_ref()));
         Self::of(cell, looked, options)
     }
 
-    fn of(cell: Cell, looked: Looked, options: &Options) -> Result<Self, ObjectError> {
+    fn of(cell: Cell, looked: Looked, options: &Options) -> Result<Self, IdentifyError> {
         if cell.object().is_none() {
-            return Err(ObjectError::NoObject);
+            return Err(IdentifyError::NoObject);
         }
         let remarks = looked.remarks();
         let Looked { usable, left_out } = looked;
         if usable.is_empty() {
             let reasons = reasons(&left_out);
             let why = if reasons.is_empty() { "it lists none with an object".into() } else { reasons };
-            return Err(ObjectError::NoClip { session: options.session.display().to_string(), why });
+            return Err(IdentifyError::NoClip {
+                session: options.session.display().to_string(),
+                target: "object",
+                why,
+            });
         }
         let all: Vec<(&str, &Clip)> = usable.iter().map(|usable| (usable.file.as_str(), &usable.clip)).collect();
         let used = Used::of(&all, left_out, options.seed);

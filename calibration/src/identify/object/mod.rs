@@ -28,13 +28,14 @@ mod polish;
 mod step;
 mod vicinity;
 
+use super::error::IdentifyError;
 pub use super::options::Options;
-use super::run::{Optimizer, Outcome, Run, RunError, Work, concluded};
+use super::run::{Optimizer, Outcome, Run, Work, concluded};
 use crate::answer::identification::Identification;
 use fit::{ObjectFit, fit_object, linearise_object};
-use inference::controller::{self, ControllerError};
-use inference::engine::{Engine, EngineError, Used};
-use inference::estimate::{Impossible, Schedule, Unknown};
+use inference::controller;
+use inference::engine::{Engine, Used};
+use inference::estimate::{Schedule, Unknown};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept};
 use inference::likelihood::arm::ArmClips;
@@ -46,71 +47,19 @@ use paper::SurfaceLoss;
 use parts::disagreement;
 use polish::{Searched, fit_polished};
 use shared_mem::cell::{Cell, ClipKind};
-use shared_mem::output::OutputError;
 use shared_mem::progress::Progress;
-use shared_mem::recording::{Clip, ReadError, SessionFiles};
+use shared_mem::recording::{Clip, SessionFiles};
 use shared_mem::theta::Theta;
-use shared_mem::toml_file::{self, TomlFileError};
+use shared_mem::toml_file;
 use std::sync::Arc;
 use std::time::Instant;
-use twin::arm::ModelError;
-use twin::replay::ReplayError;
-use twin::scene::{MeshFileError, ObjectModel, ObjectShape};
-use twin::sim::SimError;
-
-/// The object cannot be identified.
-#[derive(Debug, thiserror::Error)]
-pub enum ObjectError {
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// The parameters that are known already.
-    #[error(transparent)]
-    Theta(#[from] TomlFileError),
-    #[error(transparent)]
-    Base(#[from] BaseError),
-    /// The arm's model.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The gains.
-    #[error(transparent)]
-    Controller(#[from] ControllerError),
-    /// The object's mesh.
-    #[error(transparent)]
-    Mesh(#[from] MeshFileError),
-    /// The cell cannot be simulated.
-    #[error(transparent)]
-    Cell(#[from] SimError),
-    /// A clip cannot be replayed.
-    #[error(transparent)]
-    Replay(#[from] ReplayError),
-    /// The engine cannot be asked for these clips.
-    #[error(transparent)]
-    Engine(#[from] EngineError),
-    /// There is nothing to identify.
-    #[error("cell.toml has no [object] block; add it, or identify the arm")]
-    NoObject,
-    /// Nothing can be used.
-    #[error("{session}: no clip can be used for the object: {why}")]
-    NoClip {
-        session: String,
-        /// Reasons, clip by clip.
-        why: String,
-    },
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// The twin has no answer.
-    #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
-    Impossible(#[from] Impossible),
-    /// The answer cannot be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-}
+use twin::scene::{ObjectModel, ObjectShape};
 
 /// Identifies the object; writes theta.toml where `out` says, with everything that was known before.
 ///
 /// # Errors
-/// [`ObjectError`] naming what is wrong and the remedy.
-pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, ObjectError> {
+/// [`IdentifyError`] naming what is wrong and the remedy.
+pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, IdentifyError> {
     let began = Instant::now();
     let material = Material::open(options)?;
     let parameters = options.parameters.as_deref().map(Theta::read).transpose()?;
@@ -138,7 +87,7 @@ pub fn identify_clips(
     clips: Vec<Clip>,
     options: &Options,
     interrupt: &Interrupt,
-) -> Result<Identification, ObjectError> {
+) -> Result<Identification, IdentifyError> {
     let began = Instant::now();
     let material = Material::of_clips(cell.clone(), clips, options)?;
     let (mut answer, _) = identify_kept(&material, options, Work::passing(interrupt))?;
@@ -151,7 +100,7 @@ fn identify_kept(
     material: &Material,
     options: &Options,
     work: Work<'_>,
-) -> Result<(Identification, Theta), ObjectError> {
+) -> Result<(Identification, Theta), IdentifyError> {
     let problem = Problem::new(material, options, work)?;
     let (engine, nominal) = (options.engine.as_ref(), complete(&material.cell, None)?);
     let clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
@@ -191,7 +140,7 @@ struct Problem {
 }
 
 impl Problem {
-    fn new(material: &Material, options: &Options, work: Work<'_>) -> Result<Self, ObjectError> {
+    fn new(material: &Material, options: &Options, work: Work<'_>) -> Result<Self, IdentifyError> {
         let Work { kept, interrupt } = work;
         let mut given = options.parameters.as_deref().map(Theta::read).transpose()?.unwrap_or_default();
         given = given.about(&material.cell);
@@ -205,7 +154,7 @@ impl Problem {
                 let base = complete(&material.cell, Some(&given))?;
                 let find = || {
                     let (found, _) = controller::fitted(by, &base, hits, interrupt)?;
-                    Ok::<_, ObjectError>(Theta { arm: found.arm, ..given.clone() })
+                    Ok::<_, IdentifyError>(Theta { arm: found.arm, ..given.clone() })
                 };
                 // As text: what a person may read a number of effects in is no plain list of fields.
                 let text = kept.once_if_ok(&Fingerprint::of("gains"), || find().map(|theta| theta.to_toml()))?;
@@ -217,14 +166,15 @@ impl Problem {
         Ok(Self { settings, unknowns, known: given, warnings })
     }
 
-    fn search(&self, clips: &mut ObjectClips, options: &Options, work: Work<'_>) -> Result<ObjectFit, ObjectError> {
+    fn search(&self, clips: &mut ObjectClips, options: &Options, work: Work<'_>) -> Result<ObjectFit, IdentifyError> {
         let run = Run {
             unknowns: &self.unknowns,
             random: &[],
             optimizer: options.optimizer,
             seed: options.seed,
             budget: options.budget,
-            work,
+            kept: work.kept,
+            interrupt: work.interrupt,
         };
         if options.optimizer == Optimizer::LeastSquares {
             return self.least_squares(clips, &run);
@@ -240,14 +190,14 @@ impl Problem {
         Ok(ObjectFit { at, widths, evaluations, convergence, converged })
     }
 
-    fn least_squares(&self, clips: &mut ObjectClips, run: &Run<'_>) -> Result<ObjectFit, ObjectError> {
+    fn least_squares(&self, clips: &mut ObjectClips, run: &Run<'_>) -> Result<ObjectFit, IdentifyError> {
         let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
         let bar = Progress::new("identify", fit::usual_evaluations(clips, &self.unknowns) as u64);
         let shape = self.shape(clips)?;
-        let trail = (run.work.kept, "fit");
+        let trail = (run.kept, "fit");
         Ok(fit_polished(clips, self.searched(&shape, run.seed), &start, trail, |_, evaluations| {
             bar.show(evaluations as u64, &format!("{evaluations} clips simulated"));
-            !run.work.interrupt.asked()
+            !run.interrupt.asked()
         })?)
     }
 
@@ -255,8 +205,8 @@ impl Problem {
         Searched { unknowns: &self.unknowns, settings: self.settings.settings(), shape, seed }
     }
 
-    fn shape(&self, clips: &ObjectClips) -> Result<ObjectShape, ObjectError> {
-        Ok(ObjectModel::new(clips.cell(), Some(self.settings.base()))?.ok_or(ObjectError::NoObject)?.shape)
+    fn shape(&self, clips: &ObjectClips) -> Result<ObjectShape, IdentifyError> {
+        Ok(ObjectModel::new(clips.cell(), Some(self.settings.base()))?.ok_or(IdentifyError::NoObject)?.shape)
     }
 }
 
@@ -269,13 +219,13 @@ fn searched(cell: &Cell, base: Theta) -> (Settings, Vec<Unknown>) {
 /// `base` with the object's parameters that fit strokes best under its gains and effects: where a diagnosis begins.
 ///
 /// # Errors
-/// [`ObjectError`] when the cell cannot be simulated with `base`.
+/// [`IdentifyError`] when the cell cannot be simulated with `base`.
 pub fn refine(
     (cell, engine): (&Cell, Option<&Arc<Engine>>),
     clips: Vec<Clip>,
     base: &Theta,
     interrupt: &Interrupt,
-) -> Result<Theta, ObjectError> {
+) -> Result<Theta, IdentifyError> {
     let (settings, unknowns) = searched(cell, base.clone());
     let clips = ObjectClips::new(cell, clips, settings.clone())?;
     let mut clips = clips.simulated_by(engine, &complete(cell, None)?);

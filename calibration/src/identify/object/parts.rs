@@ -3,9 +3,10 @@
 //! A body that tumbles answers so unevenly that slopes at one point say nothing of how far an answer may be off. Four
 //! parts of the tosses, each fitted by itself, do: their spread is that of the answer, whatever the reason.
 
+use super::Problem;
 use super::fit::fit_object;
 use super::polish::let_go;
-use super::{ObjectError, Problem};
+use crate::identify::error::IdentifyError;
 use crate::identify::run::Work;
 use inference::estimate::ClipModel as _;
 use inference::estimate::interval::LEVEL;
@@ -24,13 +25,13 @@ const FEWEST_OF_A_PART: usize = 4;
 /// few. `None`: the user asked for the end.
 ///
 /// # Errors
-/// [`ObjectError`] when a part cannot be simulated.
+/// [`IdentifyError`] when a part cannot be simulated.
 pub(super) fn disagreement(
     at: &[f64],
     clips: &ObjectClips,
     problem: &Problem,
     Work { kept, interrupt }: Work<'_>,
-) -> Result<Option<Vec<f64>>, ObjectError> {
+) -> Result<Option<Vec<f64>>, IdentifyError> {
     if !let_go(clips) || clips.clips() < PARTS * FEWEST_OF_A_PART {
         return Ok(Some(vec![0.0; at.len()]));
     }

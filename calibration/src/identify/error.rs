@@ -1,0 +1,75 @@
+//! Why an arm or an object cannot be identified.
+
+use inference::controller::ControllerError;
+use inference::engine::EngineError;
+use inference::estimate::Impossible;
+use inference::forward::setting::BaseError;
+use shared_mem::output::OutputError;
+use shared_mem::recording::ReadError;
+use shared_mem::toml_file::TomlFileError;
+use twin::arm::ModelError;
+use twin::replay::ReplayError;
+use twin::scene::MeshFileError;
+use twin::sim::SimError;
+
+/// Names file, key or clip, and the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The parameters that are known already.
+    #[error(transparent)]
+    Theta(#[from] TomlFileError),
+    #[error(transparent)]
+    Base(#[from] BaseError),
+    /// The arm's model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// What leads the arm.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+    /// The object's mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshFileError),
+    /// The cell cannot be simulated.
+    #[error(transparent)]
+    Cell(#[from] SimError),
+    /// A clip cannot be replayed.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// The engine cannot be asked for these clips.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// There is no arm to identify.
+    #[error("cell.toml has no {0} block; add it, or identify the object")]
+    NoArm(&'static str),
+    /// There is no object to identify.
+    #[error("cell.toml has no [object] block; add it, or identify the arm")]
+    NoObject,
+    /// No such effect on an arm.
+    #[error("--also {given}: no effect on the arm is called so; there are {known}")]
+    Effect {
+        /// The name given.
+        given: String,
+        /// The names there are.
+        known: String,
+    },
+    /// Nothing can be used.
+    #[error("{session}: no clip can be used for the {target}: {why}")]
+    NoClip {
+        session: String,
+        /// `arm` or `object`.
+        target: &'static str,
+        /// Reasons, clip by clip.
+        why: String,
+    },
+    /// The twin has no answer.
+    #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
+    Impossible(#[from] Impossible),
+    /// Ctrl-C. What was found is kept, and the words say where.
+    #[error("{0}")]
+    Interrupted(String),
+    /// The answer cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
