@@ -134,47 +134,57 @@ pub fn diagnose_kept(
     interrupt: &Interrupt,
 ) -> Result<(Diagnosis, Arc<Kept>), DiagnoseError> {
     let interrupt = &interrupt.within(options.budget);
-    let tracking = if options.torques { torques::tracking_cell(&session.cell) } else { None };
-    let tracking = tracking.map(|cell| Session { cell, ..session.clone() });
-    let session = match &tracking {
-        None if options.torques => return Err(Refused::NoModel.into()),
-        None => session,
-        Some(tracking) => tracking,
-    };
-    let admitted = admit(session);
-    if interrupt.cancelled() {
-        return Err(DiagnoseError::Interrupted("interrupted; start again".into()));
-    }
-    let admitted = match admitted {
-        Err(Refused::NotTestable(why)) => {
+    let session = &as_asked(session, options)?;
+    let (session, admitted) = match prepared(session, options, interrupt) {
+        Err(DiagnoseError::Refused(Refused::NotTestable(why))) => {
             // A cell that cannot be simulated is an error all the same.
             setting::complete(&session.cell, options.theta.as_ref())?;
             return Ok((conclude::not_testable(session, options, &why), Arc::new(Kept::default())));
         }
-        admitted => admitted?,
+        prepared => prepared?,
     };
-    let admitted = compared(admitted, options.engine.as_deref())?;
-    let alone =
-        admitted.objects_alone().then(|| Session { cell: torques::without_robot(&session.cell), ..session.clone() });
-    let session = alone.as_ref().unwrap_or(session);
-    let mut admitted = admitted;
-    let (known, remarks) = (options.theta.as_ref(), &mut admitted.warnings);
-    let cell = controller::controlled(session.cell.clone(), &admitted.clips, known, remarks, interrupt)?;
-    let admitted = admitted.in_parts();
-    let session = &Session { cell, ..session.clone() };
     let question = Fingerprint::of("diagnose")
         .with(&(options.theta.as_ref().map(Theta::to_toml), options.seed, options.torques))
         .with_cell(&session.cell)
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
         .with_clips(&admitted.clips);
     let kept = kept::for_work((options.out.as_deref(), &session.folder, "diagnose"), &question, interrupt);
-    let found = diagnosed(session, &admitted, options, (interrupt, (&kept, "")));
+    let found = diagnosed(&session, &admitted, options, (interrupt, (&kept, "")));
     interrupt.work_is_over();
     // What work says that was cut short is no answer.
     if interrupt.cancelled() {
         return Err(DiagnoseError::Interrupted(kept.farewell(&typed::command())));
     }
     Ok((found?, kept))
+}
+
+/// The session whose arm goes where it was measured, where torques are asked about; else as it is.
+fn as_asked(session: &Session, options: &Options) -> Result<Session, DiagnoseError> {
+    let cell = if options.torques {
+        torques::tracking_cell(&session.cell).ok_or(Refused::NoModel)?
+    } else {
+        session.cell.clone()
+    };
+    Ok(Session { cell, ..session.clone() })
+}
+
+/// The session with what its clips say of the controller, and its clips as they count.
+fn prepared(session: &Session, options: &Options, interrupt: &Interrupt) -> Result<(Session, Admitted), DiagnoseError> {
+    let admitted = admit(session);
+    if interrupt.cancelled() {
+        return Err(cut_short());
+    }
+    let mut admitted = compared(admitted?, options.engine.as_deref())?;
+    let alone = admitted.objects_alone();
+    let cell = if alone { torques::without_robot(&session.cell) } else { session.cell.clone() };
+    let (known, remarks) = (options.theta.as_ref(), &mut admitted.warnings);
+    let cell = controller::controlled(cell, &admitted.clips, known, remarks, interrupt)?;
+    Ok((Session { cell, ..session.clone() }, admitted.in_parts()))
+}
+
+/// Of work of which nothing is kept.
+fn cut_short() -> DiagnoseError {
+    DiagnoseError::Interrupted("interrupted; start again".into())
 }
 
 /// Diagnoses clips that were admitted already; of the session only the cell and the name count.
@@ -188,7 +198,7 @@ pub fn diagnose_clips(
     interrupt: &Interrupt,
 ) -> Result<Diagnosis, DiagnoseError> {
     let found = diagnosed(session, admitted, options, (interrupt, (Kept::nothing(), "")));
-    if interrupt.cancelled() { Err(DiagnoseError::Interrupted("interrupted; start again".into())) } else { found }
+    if interrupt.cancelled() { Err(cut_short()) } else { found }
 }
 
 /// Clips with what an engine reports, too.
