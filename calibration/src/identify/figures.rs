@@ -1,6 +1,7 @@
 //! How far the twin is off over sets of clips, and which clips are unlike the others, for every identification alike.
 
 use crate::answer::identification::{ClipGap, Figures, Gap};
+use inference::statistics::median;
 
 /// Use of a clip that was fitted.
 pub(super) const FITTED: &str = "fitted";
@@ -30,9 +31,7 @@ pub(super) struct Odd<'a> {
 
 /// Clips whose error is more than `times` that of the middle clip, and more than `least`.
 pub(super) fn odd(clips: &[ClipGap], error: impl Fn(&ClipGap) -> f64, times: f64, least: f64) -> Vec<Odd<'_>> {
-    let mut sorted: Vec<f64> = clips.iter().map(&error).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let usual = median(clips.iter().map(&error)).unwrap_or(0.0);
     let all = clips.iter().map(|clip| Odd { clip, error: error(clip), usual });
     all.filter(|odd| clips.len() > 2 && odd.error > (times * usual).max(least)).collect()
 }

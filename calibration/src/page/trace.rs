@@ -3,6 +3,7 @@
 use super::figure::chart::{Chart, Line};
 use super::frame::legend;
 use crate::answer::Trace;
+use inference::statistics::median;
 use maud::{Markup, html};
 
 /// Half the width of the grey band, in sigma: noise alone stays inside 95 % of the time.
@@ -46,9 +47,7 @@ impl Trace {
 
 /// The stretches of a trace between which nothing was measured: no line may suggest what was there.
 fn pieces(points: &[[f64; 2]]) -> Vec<&[[f64; 2]]> {
-    let mut gaps: Vec<f64> = points.windows(2).map(|w| w[1][0] - w[0][0]).collect();
-    gaps.sort_unstable_by(f64::total_cmp);
-    let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
+    let usual = median(points.windows(2).map(|w| w[1][0] - w[0][0])).unwrap_or(0.0);
     points.chunk_by(|a, b| b[0] - a[0] <= GAP * usual).collect()
 }
 

@@ -1,5 +1,6 @@
 //! What is odd about a clip's poses that can be used all the same, one sentence each with the remedy. Base frame, SI.
 
+use crate::statistics::median;
 use shared_mem::recording::ObjectSeries;
 
 /// Fewest poses a second that show a slide.
@@ -15,9 +16,7 @@ pub(super) fn oddities(series: &ObjectSeries) -> Vec<String> {
 
 /// Usual number of poses a second.
 pub(super) fn rate(series: &ObjectSeries) -> Option<f64> {
-    let mut steps: Vec<u64> = series.stamps_ns.windows(2).map(|w| w[1] - w[0]).collect();
-    steps.sort_unstable();
-    steps.get(steps.len() / 2).map(|step| 1e9 / *step as f64)
+    median(series.stamps_ns.windows(2).map(|pair| (pair[1] - pair[0]) as f64)).map(|step_ns| 1e9 / step_ns)
 }
 
 fn slow(series: &ObjectSeries) -> Option<String> {

@@ -7,6 +7,7 @@ use crate::identify::finding::Finding;
 use crate::identify::used::Used;
 use inference::estimate::{ClipFit, Fit};
 use inference::likelihood::Setting;
+use inference::statistics::median;
 use nalgebra::DMatrix;
 use twin::effects::{Parameter, Search, registry};
 
@@ -92,9 +93,7 @@ fn alone(fit: &Fit) -> f64 {
         let gain = scaled.cholesky().map_or(0.0, |factor| gradient.dot(&factor.solve(&gradient)));
         (1.0 - gain / clip.chi2.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
     };
-    let mut shares: Vec<f64> = fit.clips.iter().map(share).collect();
-    shares.sort_unstable_by(f64::total_cmp);
-    shares[shares.len() / 2]
+    median(fit.clips.iter().map(share)).unwrap_or(1.0)
 }
 
 /// The delay of all joints together that explains most of what is left of the positions [s], and its share of it; every
