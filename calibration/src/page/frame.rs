@@ -54,6 +54,27 @@ pub(crate) fn legend(entries: &[(&str, &str)]) -> Markup {
     }
 }
 
+/// What to record next: the sentence, commands as they can be typed, and motions to be played.
+pub(crate) fn next_clip(sentence: &str, commands: &[String], motions: &[String]) -> Markup {
+    html! {
+        @if !sentence.is_empty() {
+            section {
+                h2 { "The next clip" }
+                p.next { (sentence) }
+                @if !commands.is_empty() { pre { code { (commands.join("\n")) } } }
+                @if !motions.is_empty() { ul { @for motion in motions { li { (motion) } } } }
+            }
+        }
+    }
+}
+
+/// What a reader has to know, a sentence each.
+pub(crate) fn worth_knowing(warnings: &[String]) -> Markup {
+    html! {
+        @if !warnings.is_empty() { section { h2 { "Worth knowing" } @for warning in warnings { p { (warning) } } } }
+    }
+}
+
 /// Figures to remember, each with what it is.
 pub(crate) fn facts(entries: &[(String, &str)]) -> Markup {
     html! {

@@ -1,11 +1,11 @@
 //! The page of a comparison of two sessions: what changed, by how much, and what would have been seen.
 
+use crate::answer::diagnosis::{Kind, Status};
 use crate::diagnose::against::change::{rows, smallest_in_words};
 use crate::diagnose::against::{Candidate, Comparison};
 use crate::diagnose::judge::confidence::MOST;
-use crate::diagnose::{Kind, Status};
 use crate::page::figure::bars::{Row, bars};
-use crate::page::frame::{facts, figure, frame, legend, unbroken};
+use crate::page::frame::{facts, figure, frame, legend, next_clip, unbroken, worth_knowing};
 use crate::words::share::{limited, percent_interval, probability};
 use crate::words::words;
 use maud::{Markup, html};
@@ -16,16 +16,8 @@ pub fn page(found: &Comparison) -> String {
         (gap(found))
         (changes(found))
         (others(found))
-        @if !found.next_experiment.is_empty() {
-            section {
-                h2 { "The next clip" }
-                p.next { (found.next_experiment) }
-                @if !found.next_commands.is_empty() { pre { code { (found.next_commands.join("\n")) } } }
-            }
-        }
-        @if !found.warnings.is_empty() {
-            section { h2 { "Worth knowing" } @for warning in &found.warnings { p { (warning) } } }
-        }
+        (next_clip(&found.next_experiment, &found.next_commands, &[]))
+        (worth_knowing(&found.warnings))
         (origin(found))
     };
     let [a, b] = &found.files;

@@ -5,7 +5,7 @@ use crate::page::figure::bars::{Row, bars};
 use crate::page::figure::chart::{Chart, Line};
 use crate::page::figure::forest::forest;
 use crate::page::figure::matrix::correlations;
-use crate::page::frame::{facts, figure, frame, legend, unbroken};
+use crate::page::frame::{facts, figure, frame, legend, unbroken, worth_knowing};
 use crate::page::trace::gallery;
 use crate::words::parameters::{Numbers, of_joints};
 use crate::words::quantity::{Unit, short, span};
@@ -30,9 +30,7 @@ pub fn page(found: &Identification) -> String {
         @if !found.advice.is_empty() {
             section { h2 { "What to record next" } @for advice in &found.advice { p.next { (advice_in_words(advice)) } } }
         }
-        @if !found.warnings.is_empty() {
-            section { h2 { "Worth knowing" } @for warning in &found.warnings { p { (warning) } } }
-        }
+        (worth_knowing(&found.warnings))
         (search(found))
         (origin(found))
     };

@@ -3,13 +3,13 @@
 use super::benchmark::RATES;
 use super::diagnosis::{confidence, has_effects, is_known, sizes, together, verdict_words};
 use super::identification;
+use crate::answer::diagnosis::{Candidate, Diagnosis, Kind, Status, TorqueRms};
 use crate::answer::identification::{Identification, Parameter};
 use crate::benchmark::calibrate::Regenerated;
 use crate::benchmark::score::{Method, Scores};
 use crate::diagnose::against::change;
 use crate::diagnose::against::{Candidate as Compared, Comparison};
 use crate::diagnose::judge::confidence::MOST;
-use crate::diagnose::{Candidate, Diagnosis, Kind, Status, TorqueRms};
 use crate::words::channel_in_words;
 use crate::words::parameters::{of_joints, part};
 use crate::words::quantity::span;

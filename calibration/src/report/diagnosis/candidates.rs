@@ -1,9 +1,9 @@
 //! The candidates: those in question as a table, those ruled out folded away, those that could not have been seen by name.
 
 use crate::answer::Size;
+use crate::answer::diagnosis::{Candidate, Status};
 use crate::answer::numbers;
 use crate::diagnose::judge::confidence::MOST;
-use crate::diagnose::{Candidate, Status};
 use crate::page::canvas::Canvas;
 use crate::page::figure::forest::{Group, forest};
 use crate::words::parameters::Numbers;

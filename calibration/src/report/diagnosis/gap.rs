@@ -1,7 +1,7 @@
 //! The gap in numbers: before, after, and what noise alone leaves.
 
 use super::has_effects;
-use crate::diagnose::{Diagnosis, TorqueRms};
+use crate::answer::diagnosis::{Diagnosis, TorqueRms};
 use crate::page::figure::bars::{Row, bars};
 use crate::page::frame::legend;
 use maud::{Markup, html};

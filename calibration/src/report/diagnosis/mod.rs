@@ -6,9 +6,9 @@ mod gap;
 pub(super) use candidates::sizes;
 pub(super) use gap::is_known;
 
-use crate::diagnose::{Basis, Diagnosis, Kind, Verdict};
+use crate::answer::diagnosis::{Basis, Diagnosis, Kind, NextMotion, Verdict};
 use crate::page::figure::where_map::{Cell, where_map};
-use crate::page::frame::{facts, figure, frame, unbroken};
+use crate::page::frame::{facts, figure, frame, next_clip, unbroken, worth_knowing};
 use crate::page::trace::gallery;
 use crate::words::share::{percent_interval, probability};
 use crate::words::words;
@@ -18,6 +18,7 @@ use maud::{Markup, html};
 const SHOWN_CLIPS: usize = 3;
 
 pub fn page(diagnosis: &Diagnosis) -> String {
+    let motions: Vec<String> = diagnosis.next_motions.iter().map(NextMotion::in_words).collect();
     let body = html! {
         (head(diagnosis))
         @if gap::is_known(diagnosis) {
@@ -32,19 +33,8 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         @if !diagnosis.traces.is_empty() { (residuals(diagnosis)) }
         @if !diagnosis.candidates.is_empty() { (candidates::sections(&diagnosis.candidates)) }
         @if !diagnosis.remedies.is_empty() { (remedies(diagnosis)) }
-        @if !diagnosis.next_experiment.is_empty() {
-            section {
-                h2 { "The next clip" }
-                p.next { (diagnosis.next_experiment) }
-                @if !diagnosis.next_commands.is_empty() { pre { code { (diagnosis.next_commands.join("\n")) } } }
-                @if !diagnosis.next_motions.is_empty() {
-                    ul { @for motion in &diagnosis.next_motions { li { (motion.in_words()) } } }
-                }
-            }
-        }
-        @if !diagnosis.warnings.is_empty() {
-            section { h2 { "Worth knowing" } @for warning in &diagnosis.warnings { p { (warning) } } }
-        }
+        (next_clip(&diagnosis.next_experiment, &diagnosis.next_commands, &motions))
+        (worth_knowing(&diagnosis.warnings))
         (origin(diagnosis))
     };
     let command =
@@ -179,7 +169,7 @@ pub(super) mod tests {
     use super::*;
     use crate::answer::Size;
     use crate::answer::Trace;
-    use crate::diagnose::{Candidate, Change, Clips, Gap, Nearest, Place, Remedy, Share, Status, Verdict};
+    use crate::answer::diagnosis::{Candidate, Change, Clips, Gap, Nearest, Place, Remedy, Share, Status, Verdict};
     use shared_mem::recording::SessionFiles;
     use shared_mem::theta::Theta;
     use std::collections::BTreeMap;
