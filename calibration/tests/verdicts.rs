@@ -6,6 +6,7 @@
 //! file a world: where a change is meant, its object replaces the one of that name in `verdicts.json`.
 
 mod driven;
+mod golden;
 mod slides;
 
 use calibration::benchmark::draw;
@@ -18,16 +19,11 @@ use calibration::diagnose::{Diagnosis, Options, diagnose, diagnose_clips};
 use driven::Driven;
 use inference::interrupt::Interrupt;
 use rustix::time::{ClockId, clock_gettime};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use shared_mem::cell::Cell;
 use shared_mem::msg::MAX_JOINTS;
 use std::path::Path;
 
-/// Parameters and intervals agree so far, relative to the larger [1]: fits end at steps of about 1e-8, and the C library's sine and
-/// cosine differ in their last bit from processor to processor.
-const SAME: f64 = 1e-6;
-/// Numbers below this count as equal [SI units].
-const NOTHING: f64 = 1e-9;
 /// What of an answer is held to what it was; texts may be said better.
 const KEPT: [&str; 4] = ["verdict", "gap", "candidates", "theta"];
 /// Clips of a drawn world.
@@ -138,50 +134,6 @@ fn described() -> Value {
     json!(recorded(&driven, false))
 }
 
-/// What of an answer is kept, without what is said in sentences.
-fn kept(answer: &Value) -> Value {
-    let mut of: Map<String, Value> =
-        KEPT.iter().filter_map(|key| Some(((*key).to_owned(), answer.get(key)?.clone()))).collect();
-    of.values_mut().for_each(without_sentences);
-    Value::Object(of)
-}
-
-fn without_sentences(value: &mut Value) {
-    match value {
-        Value::Object(table) => {
-            table.retain(|_, value| !value.as_str().is_some_and(|text| text.contains(' ')));
-            table.values_mut().for_each(without_sentences);
-        }
-        Value::Array(list) => list.iter_mut().for_each(without_sentences),
-        _ => {}
-    }
-}
-
-/// Where two answers differ, as `candidates.0.parameters.mass: 0.8 was 0.7`.
-fn differences(place: &str, is: &Value, was: &Value, found: &mut Vec<String>) {
-    let below = |key: &str| if place.is_empty() { key.to_owned() } else { format!("{place}.{key}") };
-    match (is, was) {
-        (Value::Object(a), Value::Object(b)) => {
-            let keys: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
-            for key in keys {
-                let [a, b] = [a, b].map(|of| of.get(key).unwrap_or(&Value::Null));
-                differences(&below(key), a, b, found);
-            }
-        }
-        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
-            a.iter().zip(b).enumerate().for_each(|(i, (a, b))| differences(&below(&i.to_string()), a, b, found));
-        }
-        (Value::Number(a), Value::Number(b)) => {
-            let [a, b] = [a, b].map(|number| number.as_f64().unwrap_or(f64::NAN));
-            if (a - b).abs() > NOTHING.max(SAME * a.abs().max(b.abs())) {
-                found.push(format!("{place}: {a} was {b}"));
-            }
-        }
-        _ if is == was => {}
-        _ => found.push(format!("{place}: {is} was {was}")),
-    }
-}
-
 /// Holds the answer on a world against what it was.
 fn holds(name: &str, answer: impl FnOnce() -> Value) {
     let cpu = || {
@@ -189,16 +141,9 @@ fn holds(name: &str, answer: impl FnOnce() -> Value) {
         used.tv_sec as f64 + 1e-9 * used.tv_nsec as f64
     };
     let before = cpu();
-    let is = kept(&answer());
+    let is = golden::kept(&answer(), &KEPT);
     eprintln!("{name}: {} {}, {:.0} CPU s", is["verdict"]["kind"], is["verdict"], cpu() - before);
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("verdicts");
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let text = serde_json::to_string_pretty(&json!({ name: is })).expect("numbers") + "\n";
-    std::fs::write(folder.join(format!("{name}.json")), text).expect("room");
-    let all: Value = serde_json::from_str(include_str!("verdicts.json")).expect("the answers of before");
-    let mut found = Vec::new();
-    differences("", &is, &all[name], &mut found);
-    assert!(found.is_empty(), "{name}:\n{}", found.join("\n"));
+    golden::holds(("verdicts", include_str!("verdicts.json")), name, &is);
 }
 
 #[test]
