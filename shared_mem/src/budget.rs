@@ -31,6 +31,17 @@ const PIECE_OF_ONE: u64 = 300;
 const LARGEST_PIECE: u64 = 1 << 29;
 
 /// What is left for reading one input. Clones draw from the same.
+///
+/// ```
+/// use shared_mem::budget::Budget;
+///
+/// let budget = Budget::with(1000, 1000); // bytes of memory, steps
+/// budget.take(600)?;
+/// assert!(budget.take(600).is_err(), "a length that a file claims is believed up to here");
+/// budget.give_back(600);
+/// assert_eq!(budget.left(), 1000);
+/// # Ok::<(), shared_mem::budget::BudgetError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Budget(Arc<Account>);
 

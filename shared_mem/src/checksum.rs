@@ -4,6 +4,15 @@
 const LENGTH: usize = 4;
 
 /// The bytes with their checksum (CRC-32) behind them.
+///
+/// ```
+/// use shared_mem::checksum::{with_checksum, without_checksum};
+///
+/// let mut kept = with_checksum(b"deviance 12.5".to_vec());
+/// assert_eq!(without_checksum(&kept), Some(&b"deviance 12.5"[..]));
+/// kept[3] ^= 1;
+/// assert_eq!(without_checksum(&kept), None, "one changed bit is enough");
+/// ```
 pub fn with_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
     let sum = crc32fast::hash(&bytes);
     bytes.extend(sum.to_le_bytes());

@@ -28,6 +28,23 @@ pub struct Camera;
 pub struct Object;
 
 /// A rigid transform from frame `From` to frame `To`.
+///
+/// Inner frames must agree, or the program does not compile:
+///
+/// ```
+/// use nalgebra::Point3;
+/// use shared_mem::frames::{Base, Camera, Object, Pose};
+///
+/// // The camera hangs one metre above the base and looks down: its z is minus the base's.
+/// let base_from_camera = Pose::<Base, Camera>::from_parts([0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]).expect("a direction");
+/// let camera_from_object = Pose::<Camera, Object>::from_parts([0.2, 0.0, 0.9], [1.0, 0.0, 0.0, 0.0]).expect("a direction");
+/// let base_from_object: Pose<Base, Object> = base_from_camera * camera_from_object;
+/// let [x, y, z] = base_from_object.position(); // m
+/// assert!((x - 0.2).abs() < 1e-12 && y.abs() < 1e-12 && (z - 0.1).abs() < 1e-12);
+///
+/// let corner = base_from_object.transform_point(&Point3::new(0.0, 0.0, 0.05));
+/// assert!((corner.z - 0.05).abs() < 1e-12);
+/// ```
 pub struct Pose<To, From> {
     isometry: Isometry3<f64>,
     frames: PhantomData<(To, From)>,

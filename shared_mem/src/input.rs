@@ -191,6 +191,20 @@ pub fn bytes(path: &Path, kind: Kind) -> Result<Vec<u8>, InputError> {
 /// # Errors
 /// As [`bytes`], and when it is neither UTF-8 nor UTF-16. What may be Windows-1252 alone is read where the text itself says so, as an
 /// XML document does: elsewhere a name could come out wrong.
+///
+/// # Example
+/// ```
+/// use shared_mem::input::{self, Kind};
+///
+/// let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("cell.toml");
+/// std::fs::write(&file, "[table]\nheight = 0.0\n")?;
+/// assert!(input::text(&file, Kind::Configuration)?.starts_with("[table]"));
+///
+/// // What is no regular file is refused, instead of being waited for.
+/// assert!(input::text(folder.path(), Kind::Configuration).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn text(path: &Path, kind: Kind) -> Result<String, InputError> {
     let bytes = bytes(path, kind)?;
     let is_no_text = |what| InputError::NotText { path: path.to_owned(), what };

@@ -17,6 +17,16 @@ const SHOWN: usize = 40;
 ///
 /// # Errors
 /// A sentence to be put behind the input's name: the budget is spent, it is no JSON, or holds something else than a `T`.
+///
+/// # Example
+/// ```
+/// use shared_mem::{budget::Budget, json};
+///
+/// let numbers: Vec<f64> = json::read(b"[1.0, 2.5]", &Budget::of(1 << 16))?;
+/// assert_eq!(numbers, [1.0, 2.5]);
+/// assert!(json::read::<Vec<f64>>(b"[1.0, ", &Budget::of(1 << 16)).is_err());
+/// # Ok::<(), String>(())
+/// ```
 pub fn read<T: DeserializeOwned>(bytes: &[u8], budget: &Budget) -> Result<T, String> {
     let text = text(bytes)?;
     draw(text.as_bytes(), budget).map_err(|spent| spent.to_string())?;

@@ -22,6 +22,16 @@ use nalgebra::{Matrix2, RealField, Vector2, convert};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 /// How rays bend.
+///
+/// ```
+/// use shared_mem::lens::Distortion;
+///
+/// let lens = Distortion::brown([-0.1, 0.01, 0.0, 0.0, 0.0]); // k1, k2, p1, p2, k3
+/// let (seen, _slope) = lens.bend(0.3, 0.2);
+/// assert!(seen.x < 0.3, "a barrel draws towards the middle");
+/// let [x, y] = lens.straight(seen.into()).expect("a ray lands there");
+/// assert!((x - 0.3).abs() < 1e-9 && (y - 0.2).abs() < 1e-9);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Distortion<T = f64> {
     /// k1, k2, p1, p2, k3, k4, k5, k6.

@@ -14,6 +14,16 @@ const LONGEST_HOST: usize = 253;
 const MOST: usize = 8;
 
 /// Where a recording comes from.
+///
+/// ```
+/// use shared_mem::origin::{Origin, Source};
+///
+/// // An arm, as `--arm` takes it.
+/// let origin: Origin = "fci://172.16.0.2".parse().expect("the address of an arm");
+/// assert_eq!(origin.source(), Source::Robot("172.16.0.2".into()));
+/// assert_eq!(origin.to_string(), "the robot at fci://172.16.0.2");
+/// assert_eq!("sim".parse(), Ok(Origin::Simulation));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Origin {

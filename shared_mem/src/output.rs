@@ -47,6 +47,18 @@ const MOST_LINKS: usize = 40;
 ///
 /// # Errors
 /// [`OutputError`] with file, cause and remedy; what was there before is unchanged.
+///
+/// # Example
+/// ```
+/// let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("theta.toml");
+/// shared_mem::output::write(&file, "[object]\nfriction = 0.3\n")?;
+/// assert_eq!(std::fs::read_to_string(&file)?, "[object]\nfriction = 0.3\n");
+///
+/// // A folder is no file: the error says so, and nothing is changed.
+/// assert!(shared_mem::output::write(folder.path(), "").is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), OutputError> {
     let bytes = bytes.as_ref();
     let mut output = Output::create(path)?;

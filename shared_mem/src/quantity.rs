@@ -10,6 +10,14 @@ const TIMES: RangeInclusive<f64> = 1e-3..=1e7;
 ///
 /// # Errors
 /// One sentence with the range and the unit, for text that is no number, not finite or outside.
+///
+/// # Example
+/// ```
+/// use shared_mem::quantity::number;
+///
+/// assert_eq!(number("0.03", 0.0..=0.5, "m"), Ok(0.03));
+/// assert_eq!(number("3 cm", 0.0..=0.5, "m"), Err("give a number from 0 to 0.5 [m]".into()));
+/// ```
 pub fn number(text: &str, range: RangeInclusive<f64>, unit: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(number) if range.contains(&number) => Ok(number),
@@ -32,6 +40,14 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 ///
 /// # Errors
 /// As [`number`]; and how many there must be.
+///
+/// # Example
+/// ```
+/// use shared_mem::quantity::numbers;
+///
+/// assert_eq!(numbers::<2>("20, 0.3", 0.0..=180.0, ""), Ok([20.0, 0.3]));
+/// assert!(numbers::<2>("20", 0.0..=180.0, "").is_err());
+/// ```
 pub fn numbers<const N: usize>(text: &str, range: RangeInclusive<f64>, unit: &str) -> Result<[f64; N], String> {
     let numbers: Result<Vec<f64>, String> = text.split(',').map(|part| number(part, range.clone(), unit)).collect();
     numbers?.try_into().map_err(|_| format!("give {N} numbers with commas between them"))

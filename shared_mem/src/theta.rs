@@ -89,6 +89,15 @@ pub struct ObjectTheta {
 }
 
 /// One effect with its parameters, by the names of the effect registry.
+///
+/// ```
+/// use shared_mem::theta::EffectTheta;
+///
+/// let block: EffectTheta = toml::from_str("name = \"command_delay\"\ndelay = 0.004\n")?; // s
+/// assert_eq!(block.numbers("delay"), Some(vec![0.004]));
+/// assert_eq!(block.numbers("mass"), None);
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectTheta {
     /// Name of the effect.

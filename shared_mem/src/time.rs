@@ -25,6 +25,14 @@ pub fn unix_offset_ns() -> i64 {
 }
 
 /// Seconds between two stamps, negative when `later` lies before `earlier`.
+///
+/// ```
+/// use shared_mem::time::{TICK_NS, now_ns, seconds_between};
+///
+/// assert_eq!(seconds_between(2 * TICK_NS, 5 * TICK_NS), 3e-3);
+/// let start = now_ns();
+/// assert!(seconds_between(start, now_ns()) >= 0.0, "the clock of all stamps never jumps");
+/// ```
 pub fn seconds_between(earlier_ns: u64, later_ns: u64) -> f64 {
     if later_ns >= earlier_ns {
         (later_ns - earlier_ns) as f64 * 1e-9

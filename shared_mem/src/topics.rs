@@ -120,6 +120,15 @@ pub const TASK_JOINTS: &str = "/task/joints";
 pub const TASK_DRIVES: &str = "/task/drives";
 
 /// Recordings of several bodies: where the body of this name is.
+///
+/// ```
+/// use shared_mem::topics::{object_of, object_pose};
+///
+/// let topic = object_pose("lid");
+/// assert_eq!(topic, "/object/lid/pose");
+/// assert_eq!(object_of(&topic, "pose"), Some("lid"));
+/// assert_eq!(object_of(&topic, "target"), None);
+/// ```
 pub fn object_pose(name: &str) -> String {
     format!("/object/{name}/pose")
 }

@@ -5,6 +5,14 @@ use std::fmt;
 use std::path::Path;
 
 /// A command that a person is advised to type: what it names is one word for a shell, whatever is in it.
+///
+/// ```
+/// use shared_mem::typed::Command;
+/// use std::path::Path;
+///
+/// let command = Command::new("calibration diagnose").path(Path::new("my session")).words("--seed 3");
+/// assert_eq!(command.to_string(), "calibration diagnose 'my session' --seed 3");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Command(String);
 

@@ -13,6 +13,17 @@ const POINTS: u32 = 400;
 /// Root mean square over the rows of `predicted - measured`, per joint [rad].
 ///
 /// `measured` is row-major with `dof` columns; rows beyond the shorter of the two do not count.
+///
+/// ```
+/// use twin::arm::{ArmModel, JointState};
+/// use twin::metrics::joint_rms;
+///
+/// let ready = *ArmModel::fr3().ready();
+/// let mut measured = [&ready[..7], &ready[..7]].concat(); // rad, row by row
+/// measured[0] += 0.01;
+/// let rms = joint_rms(&[JointState::at_rest(ready); 2], &measured, 7);
+/// assert!((rms[0] - 0.01 / 2f64.sqrt()).abs() < 1e-12 && rms[1] == 0.0);
+/// ```
 pub fn joint_rms(predicted: &[JointState], measured: &[f64], dof: usize) -> Joints {
     let mut sum = [0.0; MAX_JOINTS];
     let rows = predicted.iter().zip(measured.chunks_exact(dof.max(1)));
@@ -26,6 +37,21 @@ pub fn joint_rms(predicted: &[JointState], measured: &[f64], dof: usize) -> Join
 }
 
 /// Points spread evenly over an object's surface, in the object's frame, and the surface itself.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use shared_mem::frames::{Base, Object, Pose};
+/// use twin::metrics::SurfacePoints;
+/// use twin::scene::ObjectShape;
+///
+/// let points = SurfacePoints::new(&ObjectShape::Box { half_extents: Vector3::new(0.04, 0.03, 0.05) });
+/// let at = |x: f64, wxyz| Pose::<Base, Object>::from_parts([x, 0.0, 0.05], wxyz).expect("a direction");
+/// let (here, shifted) = (at(0.5, [1.0, 0.0, 0.0, 0.0]), at(0.51, [1.0, 0.0, 0.0, 0.0]));
+/// let turned = at(0.5, [0.0, 0.0, 0.0, 1.0]);
+/// assert!((points.add(&here, &shifted) - 0.01).abs() < 1e-9); // m
+/// // Turned by half a turn about its axis a box looks the same.
+/// assert!(points.add_s(&here, &turned) < 5e-3 && points.add(&here, &turned) > 0.03);
+/// ```
 #[derive(Clone)]
 pub struct SurfacePoints {
     points: Vec<Point3<f64>>,

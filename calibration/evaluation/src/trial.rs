@@ -55,6 +55,25 @@ pub fn read(path: &Path) -> Result<Vec<Trial>, TrialsError> {
 ///
 /// # Errors
 /// [`TrialsError::Content`].
+///
+/// # Example
+/// ```
+/// use evaluation::{findings::findings, trial::parse};
+/// use std::path::Path;
+///
+/// let mut text = String::from("world,policy,task,start,success\n");
+/// for start in 0..20 {
+///     text += &format!("laboratory,old,push,{start},{}\nlaboratory,new,push,{start},{}\n", start < 8, start < 18);
+/// }
+/// let trials = parse(&text, Path::new("trials.csv"))?;
+/// let found = findings(&trials, &["laboratory".to_owned()], 0);
+/// assert_eq!((trials.len(), found.cells.len()), (40, 2));
+/// let comparison = &found.policies[0].comparison;
+/// assert!(comparison.p.expect("same starts") < 0.01);
+///
+/// assert!(parse("world,policy\n", Path::new("trials.csv")).is_err(), "columns are missing");
+/// # Ok::<(), evaluation::trial::TrialsError>(())
+/// ```
 pub fn parse(text: &str, path: &Path) -> Result<Vec<Trial>, TrialsError> {
     let content = |line: Option<u64>, what: String| TrialsError::Content { file: path.to_owned(), line, what };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(text.as_bytes());

@@ -10,6 +10,14 @@ pub fn normal(level: f64) -> f64 {
 }
 
 /// Half the interval that holds `level` of Student's distribution with `free` degrees of freedom; infinite for none.
+///
+/// ```
+/// use inference::statistics::{normal, student};
+///
+/// assert!((normal(0.95) - 1.960).abs() < 1e-3);
+/// assert!((student(0.95, 4) - 2.776).abs() < 1e-3, "of five clips");
+/// assert!(student(0.95, 0).is_infinite(), "one clip says nothing of its scatter");
+/// ```
 pub fn student(level: f64, free: usize) -> f64 {
     StudentsT::new(0.0, 1.0, free as f64).map_or(f64::INFINITY, |t| t.inverse_cdf(0.5 + 0.5 * level))
 }

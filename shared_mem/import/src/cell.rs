@@ -43,6 +43,15 @@ damping_range = [0.0, 200.0]
 };
 
 /// What is usual for an arm with joints of these names: a Franka's joint impedance, or servos.
+///
+/// ```
+/// use import::{is_franka, usual_controller};
+///
+/// let joints: Vec<String> = (1..=7).map(|number| format!("panda_joint{number}")).collect();
+/// assert!(is_franka(&joints));
+/// assert!(usual_controller(&joints).toml.contains("joint_impedance"));
+/// assert!(usual_controller(&["shoulder".to_owned()]).toml.contains("joint_pd"));
+/// ```
 pub fn usual_controller(joints: &[String]) -> UsualController {
     if is_franka(joints) { FRANKA_CONTROLLER } else { SERVO_CONTROLLER }
 }

@@ -28,6 +28,28 @@ pub struct Contents {
 ///
 /// # Errors
 /// [`ImportError`] when there is no log that can be read, or none of a robot.
+///
+/// # Example
+/// ```
+/// use std::fmt::Write as _;
+///
+/// // A text table with a row each 10 ms: time, positions and commanded positions of three joints.
+/// let mut text = String::from("time,q1,q2,q3,q_des1,q_des2,q_des3\n");
+/// for row in 0..200 {
+///     let t = 0.01 * f64::from(row); // s
+///     let [now, next] = [t, t + 0.01].map(|t| format!("{},{},{}", t.sin(), 0.5 - t, 0.2 * t * t)); // rad
+///     writeln!(text, "{t},{now},{next}")?;
+/// }
+/// let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("log.csv");
+/// std::fs::write(&file, text)?;
+/// let contents = import::look(&file)?;
+/// assert_eq!(contents.format, "text table");
+/// assert!(contents.measured.is_some() && contents.desired.is_some() && contents.object_pose.is_none());
+///
+/// assert!(import::look(&folder.path().join("nothing.csv")).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn look(path: &Path) -> Result<Contents, ImportError> {
     let (mut found, mut logs) = (Found::at(&[path.to_owned()])?, Vec::new());
     for number in 0..found.len() {

@@ -73,6 +73,23 @@ const RIDGE: f64 = 2.0;
 const APART: f64 = 2e-3;
 
 /// The lag of a motion, joint by joint; `None` of too few rows, or where one of the two stands still.
+///
+/// An arm that comes 20 ms after its commands:
+///
+/// ```
+/// use import::lag::{Motion, between};
+///
+/// let t: Vec<f64> = (0..2000).map(|row| 0.005 * f64::from(row)).collect(); // s
+/// let motion = |lag: f64| -> Vec<Vec<f64>> {
+///     let q = |t: f64| (2.0 * t).sin() + 0.3 * (7.3 * t).sin(); // rad
+///     vec![t.iter().map(|t| q(t - lag)).collect()] // one joint
+/// };
+/// let (desired, measured) = (motion(0.0), motion(0.02));
+/// let of = |q| Motion { t: &t, q };
+/// let lag = between(of(&desired), of(&measured)).expect("both move");
+/// assert!((lag.seconds - 0.02).abs() < 1e-3);
+/// assert!(lag.interval[0] <= 0.02 && 0.02 <= lag.interval[1]);
+/// ```
 pub fn between(told: Motion<'_>, done: Motion<'_>) -> Option<Lag> {
     Some(clearest(told, done)?.1)
 }

@@ -39,6 +39,28 @@ use std::path::{Path, PathBuf};
 pub const GRAVITY: f64 = 9.81;
 
 /// What the laboratory knows about its cell. Units are SI, quaternions `w, x, y, z`.
+///
+/// ```
+/// use shared_mem::cell::Cell;
+/// use std::path::Path;
+///
+/// let text = r#"
+/// [robot]
+/// model = "fr3"
+///
+/// [object]
+/// shape = "box"
+/// size = [0.08, 0.06, 0.10] # m
+/// "#;
+/// let cell = Cell::parse(text, Path::new("cell.toml"))?;
+/// assert_eq!(cell.base_frame(), "fr3_link0");
+/// assert_eq!(cell.dof_hint(), Some(7));
+///
+/// // An unknown key is refused with file, line and the nearest known name.
+/// let error = Cell::parse("[robot]\nmodl = \"fr3\"\n", Path::new("cell.toml")).unwrap_err();
+/// assert!(error.to_string().contains("model"), "{error}");
+/// # Ok::<(), shared_mem::cell::CellError>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {

@@ -35,6 +35,23 @@ impl From<&str> for ArrayError {
 ///
 /// # Errors
 /// [`ArrayError`] when it is cut, of another kind, or too large.
+///
+/// # Example
+/// ```
+/// use shared_mem::budget::Budget;
+/// use shared_mem::recording::parse_npy;
+///
+/// let header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (2,), }\n";
+/// let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+/// bytes.extend((header.len() as u16).to_le_bytes());
+/// bytes.extend(header);
+/// bytes.extend([1.5_f64, -2.0].iter().flat_map(|value| value.to_le_bytes()));
+/// let array = parse_npy(&bytes, &Budget::of(1 << 20))?;
+/// assert_eq!((array.shape, array.values), (vec![2], vec![1.5, -2.0]));
+///
+/// assert!(parse_npy(&bytes[..20], &Budget::of(1 << 20)).is_err(), "it is cut");
+/// # Ok::<(), shared_mem::recording::ArrayError>(())
+/// ```
 pub fn parse(bytes: &[u8], budget: &Budget) -> Result<Array, ArrayError> {
     let cut = ArrayError::Cut("is no complete .npy file; save it with numpy.save");
     let (header, data) = split(bytes).ok_or(cut)?;

@@ -6,6 +6,18 @@ use std::ops::RangeInclusive;
 /// Joint positions over time, with velocities and torques where they were logged.
 ///
 /// Arrays are row-major, `len() x dof`; `dq` and `tau` are empty when not logged.
+///
+/// ```
+/// use shared_mem::recording::JointSeries;
+///
+/// // Two joints, sampled at 1 kHz.
+/// let stamps_ns = vec![0, 1_000_000, 2_000_000];
+/// let q = vec![0.0, 1.0, 0.1, 1.1, 0.2, 1.2]; // rad, one row after the other
+/// let series = JointSeries { stamps_ns, dof: 2, q, ..JointSeries::default() };
+/// assert_eq!(series.q_row(1), [0.1, 1.1]);
+/// assert_eq!(series.dq_row(1), None, "velocities were not logged");
+/// assert_eq!(series.between(1_000_000..=2_000_000).len(), 2);
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct JointSeries {
     /// One stamp a row, strictly increasing [ns].

@@ -93,6 +93,35 @@ struct Channel {
 }
 
 /// Writes one clip.
+///
+/// A clip of three rows, written and read back:
+///
+/// ```
+/// use shared_mem::cell::{Cell, ClipKind};
+/// use shared_mem::msg::arm::ArmState;
+/// use shared_mem::output::Output;
+/// use shared_mem::recording::{ClipInfo, ClipWriter, read_clip};
+///
+/// let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("clip.mcap");
+/// let text = "[robot]\nmodel = \"fr3\"\n";
+/// let info = ClipInfo { cell_toml: Some(text.into()), program: "example".into(), ..ClipInfo::default() };
+/// let mut writer = ClipWriter::whole(Output::create(&file)?, &info)?;
+/// for row in 0..3u64 {
+///     let mut state = ArmState { stamp_ns: 1 + row * 1_000_000, dof: 7, ..ArmState::default() };
+///     state.q[0] = 0.1 * row as f64; // rad
+///     writer.arm_state(&state)?;
+/// }
+/// assert!(!file.exists(), "it gets its name when it is whole");
+/// writer.finish()?;
+///
+/// let cell = Cell::parse(text, &folder.path().join("cell.toml"))?;
+/// let clip = read_clip(&file, ClipKind::Excitation, &cell)?;
+/// assert_eq!((clip.measured.len(), clip.measured.dof), (3, 7));
+/// assert_eq!(clip.measured.q_row(2)[0], 0.2);
+/// assert!((clip.measured.duration() - 2e-3).abs() < 1e-9); // s
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct ClipWriter<W: Write = File> {
     path: PathBuf,
     mcap: mcap::Writer<NoSeek<BufWriter<Counted<W>>>>,

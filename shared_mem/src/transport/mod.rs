@@ -41,6 +41,28 @@ use service::Service;
 pub const DOMAIN_VARIABLE: &str = "TWINALIGN_DOMAIN";
 
 /// A process' (or thread's) seat on shared memory.
+///
+/// A publisher and a subscriber of one topic; both sides may be in one process, and no daemon is needed:
+///
+/// ```
+/// use shared_mem::msg::arm::ArmState;
+/// use shared_mem::topics::ARM_STATE;
+/// use shared_mem::transport::Node;
+///
+/// let domain = format!("doc{}", std::process::id());
+/// let node = Node::open_in(&domain, "example")?;
+/// let subscriber = node.subscriber(ARM_STATE)?;
+/// let publisher = node.publisher(ARM_STATE)?;
+///
+/// let mut state = ArmState { stamp_ns: 1_000_000, dof: 7, ..ArmState::default() };
+/// state.q[3] = -1.5; // rad
+/// publisher.send(&state)?;
+///
+/// let received = subscriber.receive()?.expect("what was sent");
+/// assert_eq!(received.q[3], -1.5);
+/// assert!(subscriber.receive()?.is_none(), "each message is received once");
+/// # Ok::<(), shared_mem::transport::TransportError>(())
+/// ```
 #[derive(Debug)]
 pub struct Node {
     inner: iceoryx2::node::Node<Service>,

@@ -30,6 +30,23 @@ pub struct Subscriber<M: Message> {
 }
 
 /// Sleeps until something is sent on one topic.
+///
+/// ```
+/// use shared_mem::msg::arm::ArmState;
+/// use shared_mem::topics::ARM_STATE;
+/// use shared_mem::transport::Node;
+/// use std::time::Duration;
+///
+/// let node = Node::open_in(&format!("wake{}", std::process::id()), "example")?;
+/// let (subscriber, wake) = (node.subscriber(ARM_STATE)?, node.wake_on(ARM_STATE.name)?);
+/// assert!(!wake.wait(Duration::from_millis(1))?, "nothing was sent yet");
+///
+/// let publisher = node.publisher(ARM_STATE)?;
+/// publisher.send(&ArmState { stamp_ns: 1, dof: 7, ..ArmState::default() })?;
+/// assert!(wake.wait(Duration::from_secs(1))?);
+/// assert!(subscriber.newest()?.is_some());
+/// # Ok::<(), shared_mem::transport::TransportError>(())
+/// ```
 #[derive(Debug)]
 pub struct Wake {
     topic: &'static str,

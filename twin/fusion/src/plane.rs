@@ -8,6 +8,20 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 /// A plane: points with `normal · p = offset`.
+///
+/// ```
+/// use fusion::plane::{Plane, Wanted};
+/// use nalgebra::{Point3, Vector3};
+///
+/// // A table 0.1 m high, and a few points above it.
+/// let mut points: Vec<Point3<f64>> =
+///     (0..400).map(|i| Point3::new(f64::from(i % 20) * 0.02, f64::from(i / 20) * 0.02, 0.1)).collect();
+/// points.extend((0..20).map(|i| Point3::new(0.2, 0.2, 0.15 + 0.01 * f64::from(i))));
+/// let normals = vec![Vector3::z(); points.len()];
+/// let plane = Plane::largest(&points, &normals, &Wanted { tolerance: 2e-3, normal: None }).expect("a plane");
+/// assert_eq!(plane.points, 400);
+/// assert!(plane.distance(&Point3::new(0.0, 0.0, 0.1)).abs() < 1e-6); // m
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
     /// Of length 1.

@@ -5,6 +5,18 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 
 /// A surface of triangles.
+///
+/// ```
+/// use fusion::Surface;
+/// use nalgebra::Point3;
+///
+/// let corner = |x: f32, y: f32| Point3::new(x, y, 0.0); // m
+/// let points = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)];
+/// let surface = Surface { points, colors: vec![[0.5; 3]; 3], triangles: vec![[0, 1, 2]] };
+/// assert_eq!(surface.normals()[0].z, 1.0, "counter-clockwise from outside");
+/// assert!(surface.without_islands(2).triangles.is_empty());
+/// assert!(surface.obj().contains("f 1 2 3"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Surface {
     /// Corners [m].

@@ -18,6 +18,28 @@ pub struct Splat {
 }
 
 /// All splats of a body.
+///
+/// ```
+/// use nalgebra::{Point3, UnitQuaternion, Vector3};
+/// use splat::{Splat, SplatCloud};
+///
+/// let at = |x: f32| Splat {
+///     centre: Point3::new(x, 0.0, 0.0),
+///     rotation: UnitQuaternion::identity(),
+///     sigma: Vector3::repeat(0.01),
+///     opacity: 0.5,
+/// };
+/// let cloud = SplatCloud { splats: vec![at(0.0), at(0.1)], degree: 0, harmonics: vec![[0.0; 3]; 2] };
+/// assert_eq!(cloud.colour(0), [0.5; 3]);
+///
+/// // As a 3DGS PLY and back.
+/// let read = SplatCloud::parse(&cloud.ply())?;
+/// assert_eq!(read.splats.len(), 2);
+/// assert!((read.splats[1].centre.x - 0.1).abs() < 1e-6); // m
+/// assert_eq!(read.only(|number| number == 1).splats.len(), 1);
+/// assert!(SplatCloud::parse(b"ply\n").is_err());
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SplatCloud {
     /// The splats.

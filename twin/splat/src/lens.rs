@@ -4,6 +4,17 @@ use nalgebra::{Matrix2, Matrix2x3, Point3, Vector2, Vector3};
 use shared_mem::lens::Distortion;
 
 /// How a camera projects.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use splat::{Distortion, Lens};
+///
+/// let lens = Lens { focal: [600.0; 2], centre: [319.5, 239.5], distortion: Distortion::NONE }; // pixels
+/// let ([u, v], _slope) = lens.project(&Point3::new(0.1, 0.0, 1.0)); // m
+/// assert!((u - 379.5).abs() < 1e-9 && (v - 239.5).abs() < 1e-9);
+/// let ray = lens.ray([u, v]);
+/// assert!((ray.x / ray.z - 0.1).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {
     /// Focal lengths along a row and along a column.

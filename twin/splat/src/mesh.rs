@@ -8,6 +8,16 @@ const FACETS: u32 = 24;
 const RINGS: u32 = 5;
 
 /// A body's surface.
+///
+/// ```
+/// use nalgebra::{Isometry3, Point3};
+/// use splat::Mesh;
+///
+/// let link = Mesh::capsule(&Point3::origin(), &Point3::new(0.0, 0.0, 0.3), 0.05, [200, 200, 200]);
+/// let highest = link.points.iter().map(|point| point.z).fold(0.0, f32::max);
+/// assert!((highest - 0.35).abs() < 1e-3); // m
+/// assert!(link.triangles.iter().flatten().all(|corner| (*corner as usize) < link.points.len()));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     /// Corners [m].

@@ -76,6 +76,31 @@ struct Drawn {
 }
 
 /// Draws bodies once; [`Canvas`] is for the same view again and again.
+///
+/// One red splat, a metre before the camera:
+///
+/// ```
+/// use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+/// use splat::{Body, Distortion, Lens, Shape, Splat, SplatCloud, Surroundings, render};
+///
+/// let splat = Splat {
+///     centre: Point3::new(0.0, 0.0, 1.0), // m; z forward, x right, y down
+///     rotation: UnitQuaternion::identity(),
+///     sigma: Vector3::repeat(0.05), // m
+///     opacity: 0.9,
+/// };
+/// // A colour is 0.5 + 0.2821 h for the first harmonic h.
+/// let cloud = SplatCloud { splats: vec![splat], degree: 0, harmonics: vec![[1.77, -1.77, -1.77]] };
+/// let body = Body { shape: Shape::Splats(&cloud), camera_from_body: Isometry3::identity(), instance: 1 };
+/// let lens = Lens { focal: [40.0; 2], centre: [15.5; 2], distortion: Distortion::NONE }; // pixels
+/// let around = Surroundings { background: [0.0; 3], light: -Vector3::z() };
+/// let picture = render(&[body], &lens, [32, 32], &around);
+///
+/// let middle = 16 * 32 + 16; // row by row
+/// assert!(picture.color[middle][0] > 0.7 && picture.color[middle][1] < 0.05);
+/// assert!((picture.depth[middle] - 1.0).abs() < 1e-3); // m along the optical axis
+/// assert_eq!((picture.instance[middle], picture.instance[0]), (1, 0));
+/// ```
 pub fn render(bodies: &[Body<'_>], lens: &Lens, size: [usize; 2], around: &Surroundings) -> Picture {
     Canvas::new(*lens, size).render(bodies, around)
 }

@@ -13,6 +13,32 @@ use shared_mem::theta::ArmTheta;
 const POLE: f64 = 300.0;
 
 /// A joint controller with its gains.
+///
+/// ```
+/// use shared_mem::cell::Cell;
+/// use std::path::Path;
+/// use twin::arm::{ArmModel, ControlLaw, JointState, MAX_JOINTS};
+///
+/// let text = r#"
+/// [robot]
+/// model = "fr3"
+/// [controller]
+/// kind = "joint_impedance"
+/// stiffness = [600, 600, 600, 600, 250, 150, 50] # N m/rad
+/// damping = [50, 50, 50, 50, 30, 25, 15]         # N m s/rad
+/// "#;
+/// let cell = Cell::parse(text, Path::new("cell.toml"))?;
+/// let arm = ArmModel::from_cell(&cell)?;
+/// let law = ControlLaw::new(cell.controller.as_ref(), None, &arm)?;
+///
+/// // Asked to be 0.01 rad further, joint 1 gets 600 * 0.01 N m besides what holds its weight.
+/// let state = JointState::at_rest(*arm.ready());
+/// let mut q_d = state.q;
+/// q_d[0] += 0.01;
+/// let tau = law.torque(&arm, &state, &q_d, &[0.0; MAX_JOINTS]);
+/// assert!((tau[0] - arm.gravity(&state.q)[0] - 6.0).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlLaw {
     pub kind: ControllerKind,

@@ -65,6 +65,20 @@ impl ArmModel {
     }
 
     /// Mass matrix with rotor inertia on its diagonal [kg m²], `[row][column]`; 0 from `dof` on.
+    ///
+    /// ```
+    /// use twin::arm::{ArmModel, JointState};
+    ///
+    /// let arm = ArmModel::fr3();
+    /// let mass = arm.mass_matrix(arm.ready()); // kg m²
+    /// assert!((mass[1][3] - mass[3][1]).abs() < 1e-12, "it is symmetric");
+    ///
+    /// // tau = M ddq + bias, from rest.
+    /// let state = JointState::at_rest(*arm.ready());
+    /// let mut tau = arm.bias(&state);
+    /// (0..7).for_each(|joint| tau[joint] += mass[joint][3]);
+    /// assert!((arm.accelerations(&state, &tau)[3] - 1.0).abs() < 1e-9); // rad/s²
+    /// ```
     pub fn mass_matrix(&self, q: &Joints) -> [Joints; MAX_JOINTS] {
         let mut out = [[0.0; MAX_JOINTS]; MAX_JOINTS];
         with_dof!(self, N => {

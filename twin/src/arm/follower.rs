@@ -27,6 +27,26 @@ const LONGEST_PERIOD: f64 = 2e-3;
 const IDLE: f64 = 1.0;
 
 /// The way to a target.
+///
+/// ```
+/// use twin::arm::{ArmModel, Follower, Limits, MAX_JOINTS};
+///
+/// let arm = ArmModel::fr3();
+/// let mut target = *arm.ready();
+/// target[0] += 0.1; // rad
+/// let mut follower = Follower::at_rest(arm.ready(), &[0.5; MAX_JOINTS], Limits::fr3(), 1e-3); // rad/s, s
+/// follower.aim(&target).expect("within the joints' limits");
+/// let mut q = *arm.ready();
+/// let mut periods = 0;
+/// while let Some(next) = follower.step() {
+///     assert!((next[0] - q[0]).abs() <= 0.5e-3 + 1e-9, "never faster than it may");
+///     (q, periods) = (next, periods + 1);
+///     if (q[0] - target[0]).abs() < 1e-6 || periods > 5000 {
+///         break;
+///     }
+/// }
+/// assert!((q[0] - target[0]).abs() < 1e-6 && periods > 200);
+/// ```
 #[derive(Debug)]
 pub struct Follower {
     planner: Ruckig<MAX_JOINTS, IgnoreErrorHandler>,

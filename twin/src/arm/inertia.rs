@@ -6,6 +6,17 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use shared_mem::cell::Tool;
 
 /// Mass, centre of mass and inertia of a rigid body in some frame.
+///
+/// ```
+/// use twin::arm::MassProperties;
+///
+/// // A tool of 0.2 kg at the flange and a load of 0.6 kg a little further out.
+/// let tool = MassProperties::new(0.2, [0.0, 0.0, 0.05], [1e-4, 1e-4, 1e-4, 0.0, 0.0, 0.0]);
+/// let load = MassProperties::new(0.6, [0.0, 0.0, 0.13], [1e-4, 1e-4, 1e-4, 0.0, 0.0, 0.0]);
+/// let both = tool.joined_with(&load);
+/// assert!((both.mass - 0.8).abs() < 1e-12); // kg
+/// assert!((both.centre.z - 0.11).abs() < 1e-12); // m
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MassProperties {
     /// Mass [kg].

@@ -31,6 +31,18 @@ impl ArmModel {
     }
 
     /// Jacobian of the point of the last link that lies at `point` in the base frame [m].
+    ///
+    /// ```
+    /// use twin::arm::ArmModel;
+    ///
+    /// let arm = ArmModel::fr3();
+    /// let (q, mut moved) = (*arm.ready(), *arm.ready());
+    /// moved[1] += 1e-6; // rad
+    /// let point = arm.flange(&q).position();
+    /// let columns = arm.jacobian(&q, point);
+    /// let z = arm.flange(&moved).position()[2] - point[2];
+    /// assert!((z / 1e-6 - columns[1][2]).abs() < 1e-5); // m/rad
+    /// ```
     pub fn jacobian(&self, q: &Joints, point: [f64; 3]) -> Jacobian {
         let mut out = [[0.0; 6]; MAX_JOINTS];
         for (column, axis) in out.iter_mut().zip(self.axes(q)).take(self.dof) {

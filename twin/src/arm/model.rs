@@ -20,6 +20,19 @@ pub(crate) const FREE_FALL: Vec3 = [0.0, 0.0, -GRAVITY];
 const UNKNOWN_INERTIA: f64 = 0.03;
 
 /// An arm. Cloning copies a few kilobytes and allocates only for names.
+///
+/// ```
+/// use twin::arm::ArmModel;
+///
+/// let arm = ArmModel::fr3();
+/// assert_eq!(arm.dof(), 7);
+/// let flange = arm.flange(arm.ready()); // in the base frame
+/// let [x, y, z] = flange.position(); // m
+/// assert!(x > 0.2 && y.abs() < 1e-9 && z > 0.3, "before the robot, in its middle, above the table");
+/// let tau = arm.gravity(arm.ready()); // N m that hold it
+/// assert!(tau[0].abs() < 1e-9, "the first axis is vertical");
+/// assert!(tau[3] > 5.0 || tau[3] < -5.0, "{tau:?}");
+/// ```
 #[derive(Debug, Clone)]
 pub struct ArmModel {
     pub(super) dof: usize,
@@ -60,6 +73,33 @@ impl ArmModel {
     ///
     /// # Errors
     /// [`ModelError`] naming joint or link, and the remedy.
+    ///
+    /// # Example
+    /// ```
+    /// use std::path::Path;
+    /// use twin::arm::{ArmModel, MAX_JOINTS};
+    ///
+    /// let text = r#"<robot name="lever">
+    ///   <link name="base"/>
+    ///   <link name="rod"><inertial>
+    ///     <origin xyz="0.2 0 0"/><mass value="0.5"/>
+    ///     <inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/>
+    ///   </inertial></link>
+    ///   <joint name="hinge" type="revolute">
+    ///     <parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
+    ///     <limit lower="-1" upper="1" effort="10" velocity="2"/>
+    ///   </joint>
+    /// </robot>"#;
+    /// let arm = ArmModel::from_urdf(text, Path::new("lever.urdf"), &[])?;
+    /// assert_eq!(arm.joint_names(), ["hinge"]);
+    /// // 0.5 kg at 0.2 m: 0.98 N m about an axis that points along y.
+    /// assert!((arm.gravity(&[0.0; MAX_JOINTS])[0].abs() - 0.5 * 0.2 * 9.81).abs() < 1e-9);
+    ///
+    /// // Two names for one joint are refused with the remedy.
+    /// let error = ArmModel::from_urdf(text, Path::new("lever.urdf"), &["elbow".into(), "wrist".into()]).unwrap_err();
+    /// assert!(error.to_string().contains("give one for each"), "{error}");
+    /// # Ok::<(), twin::arm::ModelError>(())
+    /// ```
     pub fn from_urdf(text: &str, name: &Path, joints: &[String]) -> Result<Self, ModelError> {
         let mut arm = Self::unchecked(urdf::chain_of(text, name, joints)?)?;
         while let Some(joint) = arm.massless_joint().filter(|joint| !arm.without_inertia.contains(joint)) {

@@ -11,6 +11,22 @@ use super::{ArmModel, JointState, Joints, Yielding};
 
 impl ArmModel {
     /// Moves `state` on by `dt` seconds under constant torques [N m].
+    ///
+    /// An arm whose torques hold its weight stays where it is; without them it falls:
+    ///
+    /// ```
+    /// use twin::arm::{ArmModel, JointState, MAX_JOINTS};
+    ///
+    /// let arm = ArmModel::fr3();
+    /// let (mut held, mut falling) = (JointState::at_rest(*arm.ready()), JointState::at_rest(*arm.ready()));
+    /// for _ in 0..100 {
+    ///     let tau = arm.gravity(&held.q);
+    ///     arm.step(&mut held, &tau, 1e-3); // s
+    ///     arm.step(&mut falling, &[0.0; MAX_JOINTS], 1e-3);
+    /// }
+    /// assert!((held.q[1] - arm.ready()[1]).abs() < 1e-9);
+    /// assert!(falling.dq[1].abs() > 0.1); // rad/s
+    /// ```
     pub fn step(&self, state: &mut JointState, tau: &Joints, dt: f64) {
         with_dof!(self, N => {
             let tau = *first::<N, _>(tau);

@@ -81,6 +81,15 @@ pub struct EffectInfo {
 impl EffectInfo {
     /// What to do about this effect in `cell`, where `numbers` are its parameters by name; one that is not known takes its
     /// resting value.
+    ///
+    /// ```
+    /// use shared_mem::cell::Cell;
+    /// use twin::effects::find;
+    ///
+    /// let gain = find("torque_gain").expect("an effect on the arm");
+    /// let remedy = gain.remedy(&Cell::default(), &|parameter| (parameter == "gain").then(|| vec![0.8]));
+    /// assert!(remedy.in_cell.contains("1.25") && remedy.in_model.contains("0.8"));
+    /// ```
     pub fn remedy(&'static self, cell: &Cell, numbers: &dyn Fn(&str) -> Option<Vec<f64>>) -> Remedy {
         (self.remedy)(&Found::new(self.parameters, numbers, cell))
     }

@@ -67,6 +67,22 @@ impl Effects {
     ///
     /// # Errors
     /// [`EffectError`] naming the effect, the parameter and the remedy.
+    ///
+    /// # Example
+    /// ```
+    /// use shared_mem::theta::EffectTheta;
+    /// use twin::effects::Effects;
+    ///
+    /// let block = |text: &str| toml::from_str::<EffectTheta>(text).expect("TOML");
+    /// let friction = block("name = \"joint_coulomb_friction\"\ncoulomb = [0.4, 0.4, 0.4, 0.4, 0.2, 0.2, 0.1]"); // N m
+    /// let effects = Effects::from_theta(&[friction], 7)?;
+    /// assert!(!effects.is_none());
+    ///
+    /// // A name that nothing has is refused with the most similar one.
+    /// let error = Effects::from_theta(&[block("name = \"comand_delay\"\ndelay = 0.004")], 7).unwrap_err();
+    /// assert!(error.to_string().contains("command_delay"), "{error}");
+    /// # Ok::<(), twin::effects::EffectError>(())
+    /// ```
     pub fn from_theta(blocks: &[EffectTheta], dof: usize) -> Result<Self, EffectError> {
         let mut effects = Self::default();
         for (i, block) in blocks.iter().enumerate() {

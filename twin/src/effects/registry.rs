@@ -14,6 +14,16 @@ pub fn registry() -> &'static [EffectInfo] {
 }
 
 /// The effect with this name.
+///
+/// ```
+/// use twin::effects::{find, registry};
+///
+/// let delay = find("command_delay").expect("an effect on the arm");
+/// let parameter = &delay.parameters[0];
+/// assert_eq!((parameter.name, parameter.unit), ("delay", "s"));
+/// assert_eq!(parameter.resting_value(), 0.0);
+/// assert!(registry().len() > 30);
+/// ```
 pub fn find(name: &str) -> Option<&'static EffectInfo> {
     registry().iter().find(|effect| effect.name == name)
 }

@@ -33,6 +33,16 @@ impl Robot {
     }
 
     /// Values of a parameter that are met in practice, of this joint (from 0) or of the whole arm.
+    ///
+    /// ```
+    /// use twin::arm::ArmModel;
+    /// use twin::effects::{Robot, find};
+    ///
+    /// let friction = &find("joint_coulomb_friction").expect("an effect on the arm").parameters[0];
+    /// let [lowest, highest] = Robot::of(&ArmModel::fr3()).range(friction, Some(0)); // N m
+    /// assert!(lowest >= 0.0 && highest > lowest);
+    /// assert_eq!([lowest, highest], friction.plausible, "the registry's ranges are those of the FR3");
+    /// ```
     pub fn range(&self, parameter: &Parameter, joint: Option<usize>) -> [f64; 2] {
         let joint = joint.unwrap_or(0);
         let times = |share: [f64; 2], whole: f64| {

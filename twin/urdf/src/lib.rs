@@ -200,6 +200,31 @@ pub struct UrdfError {
 ///
 /// # Errors
 /// The first thing that is no XML, or that a link or a joint lacks, or that is no number, or a name that is given twice.
+///
+/// # Example
+/// ```
+/// use urdf_rs::{JointType, read_from_string};
+///
+/// let text = r#"<robot name="lever">
+///   <link name="base"/>
+///   <link name="rod"><inertial>
+///     <mass value="0.5"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+///   </inertial></link>
+///   <joint name="hinge" type="revolute">
+///     <parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
+///     <limit lower="-1" upper="1" effort="10" velocity="2"/>
+///   </joint>
+/// </robot>"#;
+/// let robot = read_from_string(text)?;
+/// let hinge = &robot.joints[0];
+/// assert_eq!((hinge.joint_type, hinge.limit.upper), (JointType::Revolute, 1.0)); // rad
+/// assert_eq!(robot.links[1].inertial.mass.value, 0.5); // kg
+///
+/// // What is wrong is named with its line.
+/// let error = read_from_string("<robot>\n<link/>\n</robot>").unwrap_err();
+/// assert_eq!(error.line, 2);
+/// # Ok::<(), urdf_rs::UrdfError>(())
+/// ```
 pub fn read_from_string(text: &str) -> Result<Robot, UrdfError> {
     tree::read(text)
 }

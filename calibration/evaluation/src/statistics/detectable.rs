@@ -8,6 +8,13 @@ pub const POWER: f64 = 0.8;
 
 /// The smallest difference from a share that a comparison of so many trials each sees four times in five ([`POWER`]), upwards or
 /// downwards, whichever is less; `None` where even the largest one is not seen so often.
+///
+/// ```
+/// use evaluation::statistics::smallest_difference;
+///
+/// let [few, many] = [20, 500].map(|trials| smallest_difference(0.5, [trials; 2], 0.95).expect("one shows"));
+/// assert!(few > 0.3 && many < 0.1, "twenty trials a side show only large differences");
+/// ```
 pub fn smallest_difference(share: f64, [trials, others]: [u64; 2], level: f64) -> Option<f64> {
     let seen = |other: f64| power([share, other], [trials as f64, others as f64], level) >= POWER;
     let towards = |end: f64| {

@@ -5,6 +5,17 @@ use serde::Serialize;
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 /// Pairs of trials from the same starts.
+///
+/// ```
+/// use evaluation::statistics::Pairs;
+///
+/// // Both policies from the same twenty starts: success of the first, of the second.
+/// let trials = (0..20).map(|start| [start < 16, start < 9]);
+/// let pairs = Pairs::of(trials);
+/// assert_eq!((pairs.both, pairs.first_only, pairs.second_only, pairs.neither), (9, 7, 0, 4));
+/// // McNemar's exact test: seven of seven for the first.
+/// assert!((pairs.p_value() - 2.0 * 0.5f64.powi(7)).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Pairs {
     /// Both succeed.

@@ -24,6 +24,16 @@ pub struct Powered {
 
 /// The estimate from `pairs` of one real and one simulated outcome from the same start, and `more` simulated outcomes of other
 /// starts; `None` without pairs.
+///
+/// ```
+/// use evaluation::statistics::powered;
+///
+/// // Twenty starts tried in both worlds, which agree in eighteen, and five hundred more simulated ones.
+/// let pairs: Vec<[bool; 2]> = (0..20).map(|i| [i % 10 < 6, i % 10 < if i < 2 { 0 } else { 6 }]).collect();
+/// let more: Vec<bool> = (0..500).map(|i| i % 10 < 6).collect();
+/// let found = powered(&pairs, &more, 0.95).expect("enough trials");
+/// assert!(found.worth_trials > 20.0, "worth more real trials than were made: {found:?}");
+/// ```
 pub fn powered(pairs: &[[bool; 2]], more: &[bool], level: f64) -> Option<Powered> {
     let (n, others) = (pairs.len() as f64, more.len() as f64);
     if pairs.is_empty() {

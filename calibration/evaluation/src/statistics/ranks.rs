@@ -13,6 +13,14 @@ pub struct Kruskal {
 }
 
 /// Kruskal and Wallis's test; `None` for less than two groups with something in them. Where all values are one, nothing differs.
+///
+/// ```
+/// use evaluation::statistics::kruskal_wallis;
+///
+/// let found = kruskal_wallis(&[&[1.0, 2.0, 3.0, 4.0], &[5.0, 6.0, 7.0, 8.0]]).expect("two groups");
+/// assert!(found.p < 0.05);
+/// assert!(kruskal_wallis(&[&[1.0, 2.0]]).is_none(), "one group has nothing to differ from");
+/// ```
 pub fn kruskal_wallis(groups: &[&[f64]]) -> Option<Kruskal> {
     let groups: Vec<&[f64]> = groups.iter().copied().filter(|group| !group.is_empty()).collect();
     if groups.len() < 2 {

@@ -27,6 +27,16 @@ impl Share {
     }
 
     /// Wilson's interval; from 0 to 1 without trials.
+    ///
+    /// ```
+    /// use evaluation::statistics::Share;
+    ///
+    /// let share = Share { successes: 18, trials: 20 };
+    /// let [lowest, highest] = share.interval(0.95);
+    /// assert!((share.value() - 0.9).abs() < 1e-12);
+    /// // Wilson's interval leans towards one half, and never leaves 0 to 1.
+    /// assert!((lowest - 0.699).abs() < 1e-3 && (highest - 0.972).abs() < 1e-3);
+    /// ```
     pub fn interval(self, level: f64) -> [f64; 2] {
         if self.trials == 0 {
             return [0.0, 1.0];
@@ -48,6 +58,15 @@ pub(super) fn wilson(share: f64, trials: f64, level: f64) -> [f64; 2] {
 }
 
 /// How much larger the first of two independent shares is, with Newcombe's interval: `[value, low, high]`.
+///
+/// ```
+/// use evaluation::statistics::{Share, difference};
+///
+/// let (old, new) = (Share { successes: 12, trials: 20 }, Share { successes: 18, trials: 20 });
+/// let [value, lowest, highest] = difference(new, old, 0.95);
+/// assert!((value - 0.3).abs() < 1e-12);
+/// assert!(lowest > 0.0 && highest < 0.6, "better, and by how much is not known well");
+/// ```
 pub fn difference(first: Share, second: Share, level: f64) -> [f64; 3] {
     let (p, q) = (first.value(), second.value());
     let ([p_low, p_high], [q_low, q_high]) = (first.interval(level), second.interval(level));

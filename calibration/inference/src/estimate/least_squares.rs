@@ -70,6 +70,42 @@ impl Fit {
 ///
 /// # Errors
 /// [`Impossible`] when the model has no answer at the start.
+///
+/// # Example
+/// A slope that twelve clips share, each with an offset of its own that is of no interest:
+///
+/// ```
+/// use inference::estimate::{ClipModel, Impossible, Intervals, Options, Random, Unknown, at_bounds, fit};
+///
+/// struct Lines;
+/// const SIGMA: f64 = 0.01;
+///
+/// impl ClipModel for Lines {
+///     fn clips(&self) -> usize {
+///         12
+///     }
+///
+///     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
+///         out.clear();
+///         for row in 0..50 {
+///             let x = f64::from(row) / 50.0;
+///             // What was measured: slope 2, an offset, and noise that is drawn from no generator here.
+///             let noise = SIGMA * f64::from((row * 7 + clip as i32 * 13) % 11 - 5) / 3.2;
+///             let measured = 2.0 * x + 0.1 * (clip as f64).sin() + noise;
+///             out.push((measured - (shared[0] * x + own[0])) / SIGMA);
+///         }
+///         Ok(())
+///     }
+/// }
+///
+/// let unknowns = [Unknown { name: "slope".into(), start: 1.0, lower: 0.0, upper: 10.0, step: 1e-4 }];
+/// let random = [Random { name: "offset".into(), sigma: 0.2, step: 1e-4 }];
+/// let found = fit(&Lines, &unknowns, &random, &Options::default(), |_, _| true)?;
+/// let intervals = Intervals::new(&found, &at_bounds(&unknowns, &found.shared));
+/// assert!(found.converged);
+/// assert!((found.shared[0] - 2.0).abs() < intervals.half_width[0], "{:?}", found.shared);
+/// # Ok::<(), inference::estimate::Impossible>(())
+/// ```
 pub fn fit(
     model: &impl ClipModel,
     unknowns: &[Unknown],

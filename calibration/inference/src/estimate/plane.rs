@@ -9,6 +9,16 @@ pub struct Slope {
 
 /// `y = a x + b z` by least squares through the origin, from rows `[x, z, y]`, outliers beyond ten median residuals left out
 /// once; the slopes on `x` and `z`. `None` where they cannot be distinguished.
+///
+/// ```
+/// use inference::estimate::plane::plane;
+///
+/// let row = |x: f64, z: f64| [x, z, 3.0 * x - z];
+/// let mut rows: Vec<[f64; 3]> = (0..40).map(f64::from).map(|i| row(i.sin(), i.cos())).collect();
+/// rows[7][2] += 100.0; // spoilt
+/// let [on_x, on_z] = plane(&rows).expect("they can be distinguished");
+/// assert!((on_x.value - 3.0).abs() < 1e-9 && (on_z.value + 1.0).abs() < 1e-9);
+/// ```
 pub fn plane(rows: &[[f64; 3]]) -> Option<[Slope; 2]> {
     let all = fitted(rows)?;
     let left = |[x, z, y]: &[f64; 3]| (y - all[0].value * x - all[1].value * z).abs();

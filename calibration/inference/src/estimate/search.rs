@@ -31,6 +31,18 @@ pub struct Found {
 ///
 /// `told`: costs of earlier rounds in the order in which they were told; the search is brought back to where it was
 /// with them. `watch` gets every new round's costs and the best so far.
+///
+/// ```
+/// use inference::estimate::{Evolution, Unknown, minimise};
+/// use inference::estimate::search::start;
+///
+/// let unknown = |name: &str| Unknown { name: name.into(), start: 0.5, lower: -2.0, upper: 2.0, step: 1e-4 };
+/// let unknowns = [unknown("x"), unknown("y")];
+/// let cost = |at: &[f64]| (at[0] - 1.0).powi(2) + (at[1] + 0.3).powi(2);
+/// let mut search = Evolution::new(&start(&unknowns), 1);
+/// let found = minimise(&mut search, &unknowns, 2000, &[], cost, |_, _| true);
+/// assert!((found.numbers[0] - 1.0).abs() < 1e-2 && (found.numbers[1] + 0.3).abs() < 1e-2);
+/// ```
 pub fn minimise(
     search: &mut impl Search,
     unknowns: &[Unknown],

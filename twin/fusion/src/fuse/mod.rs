@@ -53,6 +53,28 @@ impl Default for Settings {
 }
 
 /// The surface that all views see.
+///
+/// A wall half a metre before two cameras that stand side by side:
+///
+/// ```
+/// use fusion::fuse::{Settings, View, fuse};
+/// use nalgebra::Isometry3;
+/// use splat::{Camera, Distortion, Lens};
+///
+/// let lens = Lens { focal: [40.0; 2], centre: [15.5; 2], distortion: Distortion::NONE }; // pixels
+/// let depth = vec![0.5_f32; 32 * 32]; // m along the optical axis, row by row
+/// let view = |x: f64| View {
+///     camera: Camera { lens, camera_from_world: Isometry3::translation(-x, 0.0, 0.0) },
+///     size: [32, 32],
+///     depth: &depth,
+///     rgb: None,
+/// };
+/// let surface = fuse([view(0.0), view(0.02)], Settings { voxel: 0.01, ..Settings::default() });
+/// assert!(surface.triangles.len() > 100);
+/// assert!(surface.points.iter().all(|point| (point.z - 0.5).abs() < 5e-3));
+/// // Outwards is towards the cameras.
+/// assert!(surface.normals().iter().all(|normal| normal.z < -0.9));
+/// ```
 pub fn fuse<'a>(views: impl IntoIterator<Item = View<'a>>, settings: Settings) -> Surface {
     let mut grid = Grid::new(settings);
     views.into_iter().for_each(|view| grid.add(&view));
