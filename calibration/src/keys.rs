@@ -55,10 +55,10 @@ impl Keys {
         raw.special_codes[SpecialCodeIndex::VTIME] = TENTHS;
         tcsetattr(&input, OptionalActions::Now, &raw).ok()?;
         let stop = Arc::new(AtomicBool::new(false));
-        let (told, interrupt) = (stop.clone(), interrupt.clone());
+        let (stopped, interrupt) = (stop.clone(), interrupt.clone());
         let body = move || {
             let mut key = [0];
-            while !told.load(Ordering::Relaxed) {
+            while !stopped.load(Ordering::Relaxed) {
                 match io::stdin().read(&mut key).map(|read| (read, wish(key[0]))) {
                     Ok((1, Some(Wish::Pause))) => interrupt.toggle_pause(),
                     Ok((1, Some(Wish::End))) => interrupt.ask(),

@@ -86,12 +86,13 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let recovery = Recovery::new(options.task.recover);
     let placing = Placing { task, simulated: Placing::simulated(&cell), bridge: &mut bridge, interrupt };
     let (body, limits, cell) = (&body, &limits[..], &cell);
-    let mut desk = Desk { options, repeats, placing, cell, size, body, limits, session, interrupt, recovery };
-    let clips = match desk.clips(&mut link, &mut object) {
+    let mut context =
+        CaptureContext { options, repeats, placing, cell, size, body, limits, session, interrupt, recovery };
+    let clips = match context.clips(&mut link, &mut object) {
         Ok(clips) => clips,
         Err(error) => return Err(cause(error, &mut bridge)),
     };
-    let session = desk.session.folder().to_owned();
+    let session = context.session.folder().to_owned();
     let (own_bridge, origin) = (bridge.is_own(), bridge.origin().cloned());
     bridge.stop()?;
     Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge, origin })
@@ -126,7 +127,7 @@ fn size_of(cell: &Cell) -> anyhow::Result<[f64; 3]> {
 }
 
 /// Everything that stays the same from clip to clip.
-struct Desk<'a> {
+struct CaptureContext<'a> {
     options: &'a Options,
     repeats: Vec<Repeated>,
     placing: Placing<'a>,
@@ -139,7 +140,7 @@ struct Desk<'a> {
     recovery: Recovery,
 }
 
-impl<'a> Desk<'a> {
+impl<'a> CaptureContext<'a> {
     fn clips(&mut self, link: &mut Link, object: &mut ObjectWatch) -> anyhow::Result<Vec<ClipSummary>> {
         let mut clips: Vec<ClipSummary> = Vec::new();
         let wanted = self.options.task.clips as usize;
@@ -271,7 +272,7 @@ impl<'a> Desk<'a> {
         let (number, _) = self.session.next_clip()?;
         link.ready_arm(self.limits.len())?;
         let asked = std::time::Instant::now();
-        let mut told = false;
+        let mut is_said = false;
         loop {
             let Some(standing) = object.standing(COMES_TO_REST, self.interrupt)? else { return Ok(None) };
             let obstacles = object.obstacles();
@@ -304,9 +305,9 @@ impl<'a> Desk<'a> {
                     anyhow::bail!("no stroke at {} times its speed keeps the limits ({excess}){largest}", program.pace);
                 }
                 Err(error) if asked.elapsed() > BY_HAND => return Err(error.into()),
-                Err(error) if !told => {
+                Err(error) if !is_said => {
                     console::line(format_args!("{error} (waiting {} s; Ctrl-C ends)", BY_HAND.as_secs()));
-                    told = true;
+                    is_said = true;
                 }
                 Err(_) => {}
             }

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use twin::arm::JointLimits;
 use twin::scene::tallest;
 
-/// Flange and tool stay this far above table and object [m]: about twice what a loosely tuned arm strays.
+/// Flange and tool stay this far above table and object [m]: about twice the tracking error of a loosely tuned arm.
 const CLEARANCE: f64 = 0.05;
 /// Share of a transit's usual speed on the way back after a reflex.
 const BACK_PACE: f64 = 0.3;
@@ -93,7 +93,7 @@ pub fn capture(
     let mut link = Link::open(task.domain.as_deref())?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
     let (limits, floor, recovery) = (limits::of(&cell, &body), floor(&cell)?, Recovery::new(options.task.recover));
-    let mut desk = Desk { options, moving, repeats, limits, body, floor, session, interrupt, recovery };
+    let mut context = CaptureContext { options, moving, repeats, limits, body, floor, session, interrupt, recovery };
     let mut clips = Vec::new();
     loop {
         interrupt.wait_out_pause();
@@ -101,7 +101,7 @@ pub fn capture(
         if interrupt.asked() || count > task.clips as usize {
             break;
         }
-        let clip = match desk.clip(&mut link, count - 1, note) {
+        let clip = match context.clip(&mut link, count - 1, note) {
             Ok(clip) => clip,
             Err(error) => return Err(cause(error, &mut bridge)),
         };
@@ -109,7 +109,7 @@ pub fn capture(
     }
     let (own_bridge, origin) = (bridge.is_own(), bridge.origin().cloned());
     bridge.stop()?;
-    let session = desk.session.folder().to_owned();
+    let session = context.session.folder().to_owned();
     Ok(Summary { session, clips, interrupted: interrupt.asked(), own_bridge, origin })
 }
 
@@ -128,7 +128,7 @@ pub fn floor(cell: &Cell) -> anyhow::Result<f64> {
 }
 
 /// Everything that stays the same from clip to clip.
-struct Desk<'a> {
+struct CaptureContext<'a> {
     options: &'a Options,
     moving: [bool; MAX_JOINTS],
     repeats: Vec<recorded::Repeated>,
@@ -140,7 +140,7 @@ struct Desk<'a> {
     recovery: Recovery,
 }
 
-impl Desk<'_> {
+impl CaptureContext<'_> {
     /// This run's clip number `count`, from 0. `None`: interrupted before anything was recorded.
     fn clip(
         &mut self,

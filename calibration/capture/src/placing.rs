@@ -18,7 +18,7 @@ use twin::scene::cell_bodies;
 const NEAR: [f64; 2] = [5e-3, 0.05];
 /// How long a person has.
 pub const BY_HAND: Duration = Duration::from_secs(120);
-/// How often the person is told what is missing.
+/// How often the person is shown what is missing.
 const SAY: Duration = Duration::from_secs(5);
 /// How long an object may take to come to rest.
 pub const COMES_TO_REST: Duration = Duration::from_secs(10);

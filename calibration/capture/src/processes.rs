@@ -160,11 +160,11 @@ impl Running {
             std::thread::spawn(move || keep_tail(stderr, &tail));
         }
         let answer = child.stdout.take().map(|stdout| {
-            let (told, answer) = channel();
+            let (sender, answer) = channel();
             std::thread::spawn(move || {
                 // What cannot be read is missed by whoever parses the answer; who gave up on it hears nothing.
                 let text = child_output::whole(stdout, LONGEST_ANSWER).ok().flatten();
-                let _ = told.send(text.and_then(|text| String::from_utf8(text).ok()).unwrap_or_default());
+                let _ = sender.send(text.and_then(|text| String::from_utf8(text).ok()).unwrap_or_default());
             });
             answer
         });

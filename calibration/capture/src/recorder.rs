@@ -43,7 +43,7 @@ pub struct Recorded {
     pub messages: u64,
     /// Size of the file [bytes].
     pub bytes: u64,
-    /// Why recording ended before it was told to, if it did.
+    /// Why recording ended before it was asked to, if it did.
     #[serde(default)]
     pub stopped: Option<String>,
 }

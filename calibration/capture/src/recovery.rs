@@ -1,4 +1,4 @@
-//! What a capture does when the robot stops itself on the way: it ends, unless it was told how often to go on by itself. Then it
+//! What a capture does when the robot stops itself on the way: it ends, unless it was given how often to go on by itself. Then it
 //! waits, has the reflex cleared and goes on. A stop that a person pressed is never lifted.
 
 use super::link::{Link, LinkError};

@@ -86,7 +86,7 @@ const CLEARANCE: f64 = 0.05;
 const HALF: f64 = 0.5;
 
 /// Everything that stays the same from view to view.
-struct Desk<'a> {
+struct CaptureContext<'a> {
     options: &'a Options,
     body: Body,
     limits: Vec<JointLimits>,
@@ -130,9 +130,9 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let mut bridge = Bridge::find_or_start(&mut link, &wanted, &Admission::default(), interrupt)?;
     let shots = Shots::open(options.domain.as_deref(), latency)?;
     let limits = limits::of(&cell, &body);
-    let mut desk = Desk { options, body, limits, list, cut, mount, around, shots, interrupt };
+    let mut context = CaptureContext { options, body, limits, list, cut, mount, around, shots, interrupt };
     let floor = cell.table.as_ref().map_or(f64::NEG_INFINITY, |table| table.height + CLEARANCE);
-    let done = desk.all_views(&mut link, floor, &hand_eye);
+    let done = context.all_views(&mut link, floor, &hand_eye);
     let summary = done.map_err(|error| cause(error, &mut bridge))?;
     let own_bridge = bridge.is_own();
     bridge.stop()?;
@@ -161,7 +161,7 @@ fn list(cell: &Cell, hand_eye: &HandEye) -> anyhow::Result<(Value, Intrinsics)> 
     Ok((list, pinhole))
 }
 
-impl Desk<'_> {
+impl CaptureContext<'_> {
     fn all_views(&mut self, link: &mut Link, floor: f64, hand_eye: &HandEye) -> anyhow::Result<Summary> {
         let Options { at, distance, views, out, .. } = self.options;
         let state = link.ready_arm(self.limits.len())?;

@@ -1,14 +1,14 @@
-//! What another program says on its pipes, read so that it never waits for a reader, and kept only as far as it is told: a program may
+//! What another program says on its pipes, read so that it never waits for a reader, and kept only as far as it is passed on: a program may
 //! write without end, and without the end of a line.
 
 use std::io::{self, BufRead, BufReader, Read};
 use std::process::{Command, ExitStatus, Stdio};
 
-/// Of a line so much is told at most [bytes]; what follows up to its end is thrown away.
+/// Of a line so much is passed on at most [bytes]; what follows up to its end is thrown away.
 const LONGEST: usize = 4096;
 
 /// Tells each line, without its end, until the pipe ends. Bytes that are no UTF-8 are replaced.
-pub fn lines(from: impl Read, mut told: impl FnMut(&str)) {
+pub fn lines(from: impl Read, mut take: impl FnMut(&str)) {
     let mut from = BufReader::new(from);
     let mut line = Vec::new();
     loop {
@@ -18,7 +18,7 @@ pub fn lines(from: impl Read, mut told: impl FnMut(&str)) {
             return;
         }
         let ended = line.last() == Some(&b'\n');
-        told(String::from_utf8_lossy(line.strip_suffix(b"\n").unwrap_or(&line)).trim_end_matches('\r'));
+        take(String::from_utf8_lossy(line.strip_suffix(b"\n").unwrap_or(&line)).trim_end_matches('\r'));
         if !ended && from.skip_until(b'\n').is_err() {
             return;
         }

@@ -44,7 +44,7 @@ struct Results {
     failed: Option<OutputError>,
 }
 
-/// Where the steps of a piece of work are kept, and its name: pieces that are asked alike are told apart by it.
+/// Where the steps of a piece of work are kept, and its name: pieces that are asked alike are distinguished by it.
 pub type Trail<'a> = (&'a Kept, &'a str);
 
 /// The file's content.

@@ -25,7 +25,7 @@
 //! | candidate | an effect that may show in the clips at hand |
 //! | hypothesis | the baseline's numbers and those of some effects, fitted together |
 //! | shared parameters | numbers that are the same in all clips |
-//! | nuisance parameters, or own numbers | numbers of one clip alone: random effects with a known scatter, eliminated clip by clip |
+//! | nuisance parameters | those of one clip alone: random effects with a known scatter, eliminated clip by clip |
 //! | discrepancy | what any twin leaves for reasons of its own, beyond the sensors' noise |
 //! | overdispersion | how many times larger the discrepancy is than was taken for noise |
 //! | deviance | `-2 ln` of the likelihood; a nat is half a unit of it |

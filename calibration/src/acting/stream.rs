@@ -29,7 +29,7 @@ pub(super) struct Stream {
 }
 
 impl Stream {
-    /// Begins at the joints where the arm is told to be; `arm` has stream id, joints that count, and speed.
+    /// Begins at the joints to which the arm is commanded; `arm` has stream id, joints that count, and speed.
     pub(super) fn begin(arm: ArmTarget) -> std::io::Result<Self> {
         let (legs, next) = channel();
         let thread = thread::Builder::new().name("targets".into()).spawn(move || send(arm, &next))?;

@@ -48,18 +48,21 @@ fn spread(signals: &Signals) -> f64 {
 
 /// The lag of a clip; `None` where no motion tells it.
 pub(super) fn of(clip: &Columns) -> Option<Lag> {
-    let [told, done] = motions(clip)?;
+    let [commanded, done] = motions(clip)?;
     let sure = |lag: &lag::Lag| lag.correlation >= LEAST_CORRELATION;
     // Joints one by one tell more, and nothing where their order or signs are wrong.
-    let by_joint = lag::between(told, done).filter(sure);
+    let by_joint = lag::between(commanded, done).filter(sure);
     let lag::Lag { seconds, interval, correlation, .. } =
-        by_joint.or_else(|| lag::of_speeds(told, done).filter(sure)).filter(|lag| !lag.open)?;
+        by_joint.or_else(|| lag::of_speeds(commanded, done).filter(sure)).filter(|lag| !lag.open)?;
     Some(Lag { seconds, interval, correlation, rate: rate(&clip.desired, spread(&clip.desired)) })
 }
 
 /// Groups of joints that lag alike; empty where all do.
 pub(super) fn groups(clip: &Columns) -> Vec<Group> {
-    motions(clip).map(|[told, done]| lag::groups(told, done)).filter(|groups| groups.len() > 1).unwrap_or_default()
+    motions(clip)
+        .map(|[commanded, done]| lag::groups(commanded, done))
+        .filter(|groups| groups.len() > 1)
+        .unwrap_or_default()
 }
 
 /// Root mean square speed over root mean square excursion.
@@ -165,7 +168,7 @@ fn differs(clips: &[(&Columns, Lag)]) -> Option<Remark> {
     Some(remark)
 }
 
-/// An arm that moves before it is told to, or later than any controller.
+/// An arm that moves before its command, or later than any controller.
 fn impossible(clip: &Columns, lag: &Lag) -> Option<Remark> {
     let step = clip.measured.step().max(clip.desired.step());
     let [lo, hi] = lag.interval;

@@ -74,7 +74,7 @@ pub(super) const BEAT: f64 = 0.03;
 /// near.
 pub(super) const LEAST_CORRELATION: f64 = 0.9;
 /// Beyond this the arm follows closely enough for a lag to be held against the logs [1]: a servo that gives way under its load
-/// moves otherwise than it is told to, and its best match may lie anywhere.
+/// moves otherwise than it is commanded to, and its best match may lie anywhere.
 pub(super) const FOLLOWS: f64 = 0.97;
 /// One sigma of a lag that dynamics leave beside the estimate's own [s]: half the range of the lags over the clips of one
 /// simulated session is 4 to 7 ms, with and without effects.

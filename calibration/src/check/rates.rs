@@ -87,19 +87,19 @@ fn unsynchronised(clip: &Columns) -> Option<Remark> {
         return None;
     }
     stamps::beat(measured, desired)?;
-    let [rate, told] = [measured, desired].map(|signals| 1.0 / signals.step());
+    let [rate, commanded] = [measured, desired].map(|signals| 1.0 / signals.step());
     Some(
         Remark::new(
             Fault::UnsynchronisedRates,
             &clip.file,
             "measured and desired",
             format!(
-                "measurements come at {rate:.1} Hz and commands at {told:.1} Hz, unsynchronised: a command is 0 to {:.1} ms old at a \
+                "measurements come at {rate:.1} Hz and commands at {commanded:.1} Hz, unsynchronised: a command is 0 to {:.1} ms old at a \
                  measured row; they are compared by their stamps",
-                1e3 / told
+                1e3 / commanded
             ),
         )
-        .sized(Size { value: 0.5 / told, interval: [0.0, 1.0 / told], unit: "s" })
+        .sized(Size { value: 0.5 / commanded, interval: [0.0, 1.0 / commanded], unit: "s" })
         .mended_by("log every command that the controller takes, with its own stamp"),
     )
 }

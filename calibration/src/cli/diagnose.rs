@@ -172,7 +172,7 @@ pub(super) fn run(arguments: &Arguments, interrupt: &Interrupt) -> anyhow::Resul
     Ok(found)
 }
 
-/// Where the parameters go: where they are told to, or beside the answer. There nobody named the file, so one that is there
+/// Where the parameters go: where the command line says, or beside the answer. There nobody named the file, so one that is there
 /// stays.
 pub(super) fn theta_file(arguments: &Arguments) -> anyhow::Result<Option<PathBuf>> {
     if let Some(file) = &arguments.theta {

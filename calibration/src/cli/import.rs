@@ -133,15 +133,15 @@ fn say(clip: &Imported) {
 
 /// The arm of a cell, or that of a URDF's text.
 fn arm(cell: &Cell, urdf: Option<&str>) -> Result<Option<Arm>, String> {
-    let told = |error: twin::arm::ModelError| error.to_string();
+    let in_words = |error: twin::arm::ModelError| error.to_string();
     let (model, shown) = match urdf {
         Some(text) => {
-            let model = ArmModel::from_urdf(text, Path::new("robot_description"), &[]).map_err(told)?;
-            let shown = shown_urdf(text, &model).map_err(told)?;
+            let model = ArmModel::from_urdf(text, Path::new("robot_description"), &[]).map_err(in_words)?;
+            let shown = shown_urdf(text, &model).map_err(in_words)?;
             (model, Some(shown))
         }
         None if cell.robot.is_none() => return Ok(None),
-        None => (ArmModel::from_cell(cell).map_err(told)?, shown_robot(cell).map_err(told)?),
+        None => (ArmModel::from_cell(cell).map_err(in_words)?, shown_robot(cell).map_err(in_words)?),
     };
     let (joints, held) = (model.joint_names().to_vec(), HeldJoint::in_words(model.held_joints()));
     let without_inertia = model.joints_without_inertia().into_iter().map(str::to_owned).collect::<Vec<_>>();

@@ -1,4 +1,4 @@
-//! The verb `demo`: the whole story on the simulated cell. A robot with gains nobody was told and a hidden effect is shadowed by
+//! The verb `demo`: the whole story on the simulated cell. A robot with gains that nobody knows and a hidden effect is shadowed by
 //! a twin that believes cell.toml; a session is recorded and diagnosed; replayed with cell.toml and with what was found, it
 //! shows how far the gap shrinks.
 

@@ -31,7 +31,7 @@ pub(super) struct Answers {
 }
 
 impl Stage {
-    /// Starts the simulated cell of `cell` with the truth in `hidden` (gains, effect), and a twin that is not told.
+    /// Starts the simulated cell of `cell` with the truth in `hidden` (gains, effect), and a twin that does not know it.
     ///
     /// # Errors
     /// When a program is missing, ends, or the twin does not begin to shadow; the line holds its last words.

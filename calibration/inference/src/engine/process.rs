@@ -70,8 +70,8 @@ impl Process {
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (Some(stdin), Some(stdout), Some(stderr)) = pipes else { return Err(fail("it has no pipes".into())) };
         let (requests, asked) = channel();
-        let (told, answers) = channel();
-        std::thread::spawn(move || serve((stdin, stdout), &asked, &told));
+        let (answered, answers) = channel();
+        std::thread::spawn(move || serve((stdin, stdout), &asked, &answered));
         let last_words = Arc::default();
         let words = Arc::clone(&last_words);
         std::thread::spawn(move || listen(stderr, &words));
@@ -165,7 +165,7 @@ impl Drop for Process {
 fn serve(
     (mut stdin, stdout): (ChildStdin, ChildStdout),
     asked: &Receiver<Asked>,
-    told: &Sender<Result<Frame, FrameError>>,
+    answered: &Sender<Result<Frame, FrameError>>,
 ) {
     let mut stdout = BufReader::with_capacity(1 << 16, stdout);
     while let Ok(Asked { message, most }) = asked.recv() {
@@ -173,7 +173,7 @@ fn serve(
         let sent = stdin.write_all(&message).and_then(|()| stdin.flush());
         let answer = frame::read(&mut stdout, most);
         let ended = sent.is_err() || answer.is_err();
-        if told.send(answer).is_err() || ended {
+        if answered.send(answer).is_err() || ended {
             return;
         }
     }

@@ -90,7 +90,7 @@ impl Computed {
         let (file, running) = (path.to_owned(), Arc::clone(&stop));
         let work = move || {
             let open = open(&file, output);
-            let Some((mut session, output)) = told(&opened, open) else { return };
+            let Some((mut session, output)) = report(&opened, open) else { return };
             for given in asks {
                 if answer.send(run(&mut session, given, &output, &running)).is_err() {
                     return;
@@ -114,7 +114,7 @@ impl Computed {
 }
 
 /// Tells what came of opening a file and goes on with it, unless nobody is there any more.
-fn told(opened: &Sender<Result<Vec<Port>, String>>, open: Result<Opened, String>) -> Option<(Session, String)> {
+fn report(opened: &Sender<Result<Vec<Port>, String>>, open: Result<Opened, String>) -> Option<(Session, String)> {
     match open {
         Ok(Opened { session, output, inputs }) => opened.send(Ok(inputs)).is_ok().then_some((session, output)),
         Err(what) => {
