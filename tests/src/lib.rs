@@ -4,9 +4,12 @@
 //! the machine that runs tests is slow and shared.
 
 mod bench;
+pub mod constants;
 mod judge;
+pub mod measures;
 pub mod modules;
 mod program;
+pub mod sources;
 pub mod teleop;
 pub mod texts;
 

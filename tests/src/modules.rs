@@ -41,25 +41,30 @@ fn members(group: &str) -> Vec<&str> {
     found
 }
 
-/// Where the paths of `text` lead that begin with `crate::` or `super::`, from the package's root on; `own` is the module
-/// that the text belongs to.
-fn needed(own: &[String], text: &str) -> Vec<Vec<String>> {
+/// The paths in `text` that begin with `name::`, each with its names.
+pub fn paths(text: &str, name: &str) -> Vec<Vec<String>> {
     let mut found = Vec::new();
-    for (at, _) in text.match_indices("crate::").chain(text.match_indices("super::")) {
+    for (at, _) in text.match_indices(&format!("{name}::")) {
         let before = &text[..at];
         let is_begin = !before.ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':');
         // Who may see an item is not what it needs.
-        if !is_begin || before.ends_with("(in ") {
-            continue;
-        }
-        for path in begun(&text[at..]) {
-            let up = path.iter().take_while(|name| *name == "super").count();
-            let base = if up > 0 { &own[..own.len().saturating_sub(up)] } else { &[] };
-            let names = path.into_iter().skip(up.max(1)).filter(|name| name != "self");
-            found.push(base.iter().cloned().chain(names).collect());
+        if is_begin && !before.ends_with("(in ") {
+            found.extend(begun(&text[at..]));
         }
     }
     found
+}
+
+/// Where the paths of `text` lead that begin with `crate::` or `super::`, from the package's root on; `own` is the module
+/// that the text belongs to.
+pub fn needed(own: &[String], text: &str) -> Vec<Vec<String>> {
+    let from_root = |path: Vec<String>| {
+        let up = path.iter().take_while(|name| *name == "super").count();
+        let base = if up > 0 { &own[..own.len().saturating_sub(up)] } else { &[] };
+        let names = path.into_iter().skip(up.max(1)).filter(|name| name != "self");
+        base.iter().cloned().chain(names).collect()
+    };
+    paths(text, "crate").into_iter().chain(paths(text, "super")).map(from_root).collect()
 }
 
 /// The module that a file of a package is, from the package's root on; `None` for a program of its own.

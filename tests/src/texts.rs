@@ -1,6 +1,7 @@
 //! What a person reads: the help of every verb, the documents, and the texts in the sources.
 
 use crate::program_path;
+use crate::sources::{Source, product_without_tests};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -102,45 +103,10 @@ pub fn documents() -> Vec<(String, String)> {
     all.map(read).collect()
 }
 
-/// The folders with the sources of the product.
-pub const PRODUCT: [&str; 14] = [
-    "shared_mem/src",
-    "twin/splat/src",
-    "twin/fusion/src",
-    "twin/reconstruct/src",
-    "twin/urdf/src",
-    "twin/src",
-    "rt_bridge/link/src",
-    "rt_bridge/src",
-    "shared_mem/import/src",
-    "calibration/evaluation/src",
-    "calibration/inference/src",
-    "calibration/vision/src",
-    "calibration/capture/src",
-    "calibration/src",
-];
-
 /// Every string in the sources of the product, tests left out: its file, and the string with escaped line ends as spaces.
-///
-/// # Panics
-/// When a source cannot be read.
 pub fn literals() -> Vec<(String, String)> {
-    let mut found = Vec::new();
-    let mut folders: Vec<PathBuf> = PRODUCT.map(|folder| root().join(folder)).into();
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).expect("a folder").map(|entry| entry.expect("an entry").path()) {
-            let name = entry.strip_prefix(root()).expect("below the root").display().to_string();
-            let file = entry.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            if entry.is_dir() {
-                folders.push(entry);
-            } else if file.ends_with(".rs") && !file.ends_with("tests.rs") && !file.starts_with("test_") {
-                let text = std::fs::read_to_string(&entry).expect("a readable source");
-                let product = text.split("#[cfg(test)]").next().unwrap_or("");
-                found.extend(strings(product).into_iter().map(|string| (name.clone(), string)));
-            }
-        }
-    }
-    found
+    let of = |source: Source| strings(source.product()).into_iter().map(move |string| (source.file.clone(), string));
+    product_without_tests(&root()).into_iter().flat_map(of).collect()
 }
 
 /// The string literals of Rust code.

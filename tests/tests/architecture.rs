@@ -1,51 +1,8 @@
 //! What the house must look like: one door per big dependency, files that own one idea, a README that tells the truth.
 
-use std::path::{Path, PathBuf};
 use tests::modules::{circles, module, needs};
-use tests::texts::PRODUCT;
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace").to_owned()
-}
-
-/// Every Rust file below `folder`, with its path from the workspace's root.
-fn sources(folder: &str) -> Vec<(String, String)> {
-    let mut found = Vec::new();
-    let mut folders = vec![root().join(folder)];
-    while let Some(folder) = folders.pop() {
-        let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
-        for entry in entries.map(|e| e.expect("an entry").path()) {
-            if entry.is_dir() {
-                folders.push(entry);
-            } else if entry.extension().is_some_and(|e| e == "rs") {
-                let name = entry.strip_prefix(root()).expect("below the root").display().to_string();
-                found.push((name, std::fs::read_to_string(&entry).expect("a readable source")));
-            }
-        }
-    }
-    found
-}
-
-fn product_sources() -> Vec<(String, String)> {
-    PRODUCT.iter().flat_map(|folder| sources(folder)).collect()
-}
-
-/// The lines of every product file that are neither tests nor comments.
-fn product_lines() -> Vec<(String, Vec<String>)> {
-    let is_test = |file: &str| {
-        let name = file.rsplit('/').next().unwrap_or(file);
-        file.contains("/tests/") || name.ends_with("tests.rs") || name.starts_with("test_")
-    };
-    product_sources()
-        .into_iter()
-        .filter(|(file, _)| !is_test(file))
-        .map(|(file, text)| {
-            let product = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("");
-            let lines = product.lines().filter(|line| !line.trim_start().starts_with("//"));
-            (file, lines.map(str::to_owned).collect())
-        })
-        .collect()
-}
+use tests::sources::{PRODUCT, Source, below, product, product_without_tests};
+use tests::texts::root;
 
 /// Whether a path begins with `name`: `libfranka::` is another crate than `franka::`.
 fn is_named(line: &str, name: &str) -> bool {
@@ -95,7 +52,7 @@ fn each_big_dependency_has_one_door() {
         ("schemars", &["shared_mem/src/cell/"]),
         ("base64", &["twin/reconstruct/src/assets/page.rs", "calibration/src/page/picture.rs"]),
     ];
-    for (file, text) in product_sources() {
+    for Source { file, text } in product(&root()) {
         for (dependency, allowed) in doors {
             let enters = text.lines().any(|line| {
                 let line = line.trim_start();
@@ -115,8 +72,9 @@ fn each_big_dependency_has_one_door() {
 fn files_come_in_by_one_door() {
     let doors = ["shared_mem/src/input.rs", "shared_mem/src/output", "rt_bridge/src/doctor/"];
     let ways = ["fs::read(", "fs::read_to_string(", "File::open("];
-    for (file, lines) in product_lines() {
-        let enters = lines.iter().any(|line| ways.iter().any(|way| line.contains(way)));
+    for source in product_without_tests(&root()) {
+        let file = &source.file;
+        let enters = source.code().any(|line| ways.iter().any(|way| line.contains(way)));
         assert!(
             !enters || doors.iter().any(|door| file.starts_with(door)),
             "{file} reads a file by itself; shared_mem::input refuses pipes, devices and files without end"
@@ -126,7 +84,7 @@ fn files_come_in_by_one_door() {
 
 #[test]
 fn every_file_says_what_it_owns_and_stays_readable() {
-    for (file, text) in product_sources() {
+    for Source { file, text } in product(&root()) {
         assert!(text.starts_with("//!"), "{file} does not begin by saying what it owns (`//!`)");
         let lines = text.lines().count();
         assert!(lines <= 450, "{file} has {lines} lines; split it by idea");
@@ -136,7 +94,7 @@ fn every_file_says_what_it_owns_and_stays_readable() {
 #[test]
 fn unsafe_code_lives_in_two_files() {
     let homes = ["rt_bridge/src/rt/process.rs", "shared_mem/src/transport/storage.rs"];
-    for (file, text) in product_sources() {
+    for Source { file, text } in product(&root()) {
         let uses = text.lines().any(|l| {
             !l.trim_start().starts_with("//")
                 && (l.contains("unsafe {") || l.contains("unsafe fn") || l.contains("unsafe impl"))
@@ -154,8 +112,9 @@ fn outputs_are_written_whole_or_not_at_all() {
     // A live recording is there from the beginning, and grows.
     let doors = ["shared_mem/src/output", "shared_mem/src/recording/writer.rs"];
     let writes = ["fs::write(", "File::create", ".write(true)", "fs::rename(", "fs::copy("];
-    for (file, lines) in product_lines() {
-        let found = lines.iter().flat_map(|line| writes.iter().filter(|word| line.contains(**word))).next();
+    for source in product_without_tests(&root()) {
+        let file = &source.file;
+        let found = source.code().flat_map(|line| writes.iter().filter(|word| line.contains(**word))).next();
         assert!(
             found.is_none() || doors.iter().any(|door| file.starts_with(door)),
             "{file} writes a file by `{}`; outputs go through shared_mem::output",
@@ -168,7 +127,7 @@ fn outputs_are_written_whole_or_not_at_all() {
 fn the_control_path_reaches_for_no_files_locks_or_logs() {
     let forbidden =
         ["std::fs", "println!", "eprintln!", "tracing::", "Mutex", "RwLock", ".unwrap()", ".expect(", "format!("];
-    for (file, text) in sources("rt_bridge/src/rt").into_iter().chain(sources("rt_bridge/src/safety")) {
+    for Source { file, text } in ["rt_bridge/src/rt", "rt_bridge/src/safety"].iter().flat_map(|f| below(&root(), f)) {
         let product = text.split("#[cfg(test)]").next().unwrap_or("");
         for word in forbidden {
             let found = product.lines().any(|l| !l.trim_start().starts_with("//") && l.contains(word));
@@ -184,9 +143,10 @@ fn one_file_writes_to_standard_error_and_one_to_standard_output() {
         ("io::stderr", "shared_mem/src/console.rs"),
         ("io::stdout", "shared_mem/src/answer.rs"),
     ];
-    for (file, lines) in product_lines() {
+    for source in product_without_tests(&root()) {
         for (word, home) in homes {
-            let found = lines.iter().any(|line| line.contains(word));
+            let file = &source.file;
+            let found = source.code().any(|line| line.contains(word));
             assert!(!found || file == home, "{file} uses `{word}`; {home} writes without stopping or ending anything");
         }
     }
@@ -194,8 +154,8 @@ fn one_file_writes_to_standard_error_and_one_to_standard_output() {
 
 #[test]
 fn a_thread_that_panics_takes_no_other_along() {
-    for (file, lines) in product_lines() {
-        let product = lines.join("\n");
+    for source in product_without_tests(&root()) {
+        let (file, product) = (&source.file, source.code_text());
         let joined = product.split(".join()").skip(1).map(str::trim_start);
         for after in joined {
             let panics = [".expect(", ".unwrap()"].iter().any(|call| after.starts_with(call));
@@ -206,15 +166,21 @@ fn a_thread_that_panics_takes_no_other_along() {
 
 #[test]
 fn what_identifies_and_diagnoses_names_no_effect() {
-    let of = |(_, text): (String, String)| {
-        let (_, after) = text.split_once("EffectInfo = EffectInfo {\n    name: \"")?;
+    let of = |source: Source| {
+        let (_, after) = source.text.split_once("EffectInfo = EffectInfo {\n    name: \"")?;
         after.split_once('"').map(|(name, _)| format!("\"{name}\""))
     };
-    let effects: Vec<String> = sources("twin/src/effects").into_iter().filter_map(of).collect();
+    let effects: Vec<String> = below(&root(), "twin/src/effects").into_iter().filter_map(of).collect();
     assert!(effects.len() > 30, "{effects:?}");
-    let folders = ["src/check/", "src/diagnose/", "src/identify/", "inference/src/"]
-        .map(|folder| format!("calibration/{folder}"));
-    for (file, text) in product_sources().into_iter().filter(|(file, _)| folders.iter().any(|f| file.starts_with(f))) {
+    let folders = [
+        "calibration/src/check/",
+        "calibration/src/diagnose/",
+        "calibration/src/identify/",
+        "calibration/inference/src/estimate/",
+        "calibration/inference/src/likelihood/",
+    ];
+    let ours = |source: &Source| folders.iter().any(|folder| source.file.starts_with(folder));
+    for Source { file, text } in product(&root()).into_iter().filter(ours) {
         let is_test = file.contains("test_") || file.contains("/injected/");
         let product = text.split("#[cfg(test)]").next().unwrap_or("").lines();
         for line in product.filter(|line| !is_test && !line.trim_start().starts_with("//")) {
@@ -230,84 +196,32 @@ fn what_identifies_and_diagnoses_names_no_effect() {
 #[test]
 fn the_laws_of_motion_know_no_effect() {
     let laws = ["arm/", "sliding/", "physics/", "world/", "contact_law.rs"].map(|law| format!("twin/src/{law}"));
-    for (file, lines) in product_lines() {
-        let known = lines.iter().find(|line| line.contains("crate::effects"));
-        let is_law = laws.iter().any(|law| file.starts_with(law));
+    for source in product_without_tests(&root()) {
+        let known = source.code().find(|line| line.contains("crate::effects"));
+        let is_law = laws.iter().any(|law| source.file.starts_with(law));
         assert!(
             !is_law || known.is_none(),
-            "{file} knows effects; they fill in its numbers or implement its traits: {known:?}"
+            "{} knows effects; they fill in its numbers or implement its traits: {known:?}",
+            source.file
         );
     }
 }
 
 #[test]
 fn modules_beside_each_other_need_each_other_in_no_circle() {
-    let lines = product_lines();
+    let sources = product_without_tests(&root());
     let mut found = Vec::new();
     for package in PRODUCT {
-        let of_package = |(file, lines): &(String, Vec<String>)| {
-            let own = module(file.strip_prefix(package)?.strip_prefix('/')?)?;
-            Some((own, lines.join("\n")))
+        let of_package = |source: &Source| {
+            let own = module(source.file.strip_prefix(package)?.strip_prefix('/')?)?;
+            Some((own, source.code_text()))
         };
-        let files: Vec<(Vec<String>, String)> = lines.iter().filter_map(of_package).collect();
+        let files: Vec<(Vec<String>, String)> = sources.iter().filter_map(of_package).collect();
         let left = needs(&files).into_iter().map(|(folder, needs)| (folder, circles(needs)));
         let left = left.filter(|(_, circles)| !circles.is_empty());
         found.extend(left.map(|(folder, circles)| format!("{package}/{}: {circles:?}", folder.join("/"))));
     }
     assert!(found.is_empty(), "modules that need each other, by way of these:\n{}", found.join("\n"));
-}
-
-#[test]
-fn the_diagnosis_goes_one_way() {
-    let steps = ["clips", "library", "fit", "judge", "propose", "search", "conclude"];
-    let step = |file: &str| {
-        let within = file.strip_prefix("calibration/src/diagnose/")?.split('/').next()?;
-        steps.iter().position(|step| within.strip_suffix(".rs").unwrap_or(within) == *step)
-    };
-    for (file, lines) in product_lines() {
-        let Some(own) = step(&file) else { continue };
-        for later in &steps[own + 1..] {
-            let needs = lines.iter().find(|line| line.contains(&format!("crate::diagnose::{later}")));
-            assert!(needs.is_none(), "{file} needs {later}, a later step: {}", needs.unwrap_or(&String::new()));
-        }
-    }
-}
-
-#[test]
-fn dependencies_point_one_way() {
-    let rules: [(&str, &[&str]); 13] = [
-        (
-            "shared_mem",
-            &["splat", "fusion", "twin", "link", "rt_bridge", "calibration", "evaluation", "import", "reconstruct"],
-        ),
-        (
-            "rt_bridge/link",
-            &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"],
-        ),
-        ("twin/splat", &["fusion", "twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]),
-        ("twin/fusion", &["twin", "rt_bridge", "calibration", "evaluation", "import", "urdf", "reconstruct"]),
-        (
-            "shared_mem/import",
-            &["splat", "fusion", "twin", "rt_bridge", "calibration", "evaluation", "urdf", "reconstruct"],
-        ),
-        ("twin/reconstruct", &["twin", "rt_bridge", "calibration", "evaluation", "import", "urdf"]),
-        ("calibration/evaluation", &["rt_bridge", "calibration", "import"]),
-        ("twin", &["rt_bridge", "calibration", "evaluation", "import"]),
-        ("rt_bridge", &["calibration", "evaluation", "import", "reconstruct"]),
-        ("calibration/inference", &["rt_bridge", "calibration", "evaluation", "import", "vision"]),
-        ("calibration/capture", &["rt_bridge", "calibration", "evaluation", "import", "vision"]),
-        ("calibration/vision", &["capture", "rt_bridge", "calibration", "evaluation", "import"]),
-        ("calibration", &["rt_bridge"]),
-    ];
-    for (package, forbidden) in rules {
-        let manifest = std::fs::read_to_string(root().join(package).join("Cargo.toml")).expect("a manifest");
-        for other in forbidden {
-            assert!(
-                !manifest.lines().any(|l| l.starts_with(&format!("{other}.workspace"))),
-                "{package} must not depend on {other}"
-            );
-        }
-    }
 }
 
 #[test]

@@ -1,0 +1,293 @@
+//! The plan of the house: what stands at the top of the tree, who may need whom, and of what there is only one.
+
+use std::collections::BTreeSet;
+use tests::modules::{module, needed, paths};
+use tests::sources::{Source, below, product_without_tests};
+use tests::texts::root;
+
+/// What stands at the top of the tree and may hold code.
+const TOP: [&str; 10] =
+    ["adapters", "calibration", "config", "docs", "fuzz", "python", "rt_bridge", "shared_mem", "tests", "twin"];
+/// How files with code end.
+const CODE: [&str; 7] = ["c", "cpp", "js", "py", "rs", "sh", "wgsl"];
+
+/// A crate of the product.
+struct Crate {
+    folder: &'static str,
+    /// As paths call it.
+    name: &'static str,
+    /// The crates of the house that it may need.
+    needs: &'static [&'static str],
+}
+
+/// The crates from the ground up: each needs those before it alone, and of them the listed ones.
+const CRATES: [Crate; 14] = [
+    Crate { folder: "shared_mem", name: "shared_mem", needs: &[] },
+    Crate { folder: "shared_mem/import", name: "import", needs: &["shared_mem"] },
+    Crate { folder: "twin/urdf", name: "urdf_rs", needs: &[] },
+    Crate { folder: "twin/splat", name: "splat", needs: &["shared_mem"] },
+    Crate { folder: "twin/fusion", name: "fusion", needs: &["splat"] },
+    Crate { folder: "twin/reconstruct", name: "reconstruct", needs: &["fusion", "shared_mem", "splat"] },
+    Crate { folder: "twin", name: "twin", needs: &["reconstruct", "shared_mem", "splat", "urdf_rs"] },
+    Crate { folder: "rt_bridge/link", name: "link", needs: &["shared_mem"] },
+    Crate { folder: "rt_bridge", name: "rt_bridge", needs: &["link", "shared_mem", "twin"] },
+    Crate { folder: "calibration/inference", name: "inference", needs: &["shared_mem", "twin"] },
+    Crate { folder: "calibration/vision", name: "vision", needs: &["inference", "shared_mem", "twin"] },
+    Crate { folder: "calibration/capture", name: "capture", needs: &["inference", "shared_mem", "twin"] },
+    Crate { folder: "calibration/evaluation", name: "evaluation", needs: &["shared_mem", "twin"] },
+    Crate {
+        folder: "calibration",
+        name: "calibration",
+        needs: &["capture", "evaluation", "import", "inference", "shared_mem", "twin", "vision"],
+    },
+];
+
+/// The rooms of `inference` and `calibration` from the ground up: a room needs those of the lines above it, and none of its own
+/// line. What lies in a room belongs to it unless it is a room itself.
+const FLOORS: &[&[&str]] = &[
+    &["inference/statistics", "inference/seed", "inference/interrupt", "inference/child_output"],
+    &["inference/kept"],
+    &["inference/engine", "inference/estimate"],
+    &["inference/forward"],
+    &["calibration/identify/sheet", "calibration/identify/split", "calibration/identify/remarks"],
+    &["calibration/identify/answer", "calibration/diagnose/answer"],
+    &["calibration/identify/run"],
+    &["calibration/identify/arm", "calibration/identify/joint", "calibration/identify/object"],
+    &["calibration/diagnose/clips", "calibration/diagnose/criteria", "calibration/diagnose/known_gains"],
+    &["calibration/diagnose/library"],
+    &["calibration/diagnose/evidence"],
+    &["calibration/diagnose/fit"],
+    &["calibration/diagnose/judge"],
+    &["calibration/diagnose/propose"],
+    &["calibration/diagnose/search"],
+    &["calibration/diagnose/conclude"],
+    &["calibration/diagnose/against"],
+    &["calibration/identify", "calibration/diagnose"],
+    &["calibration/page"],
+    &["calibration/benchmark"],
+    &["calibration/check", "calibration/study", "calibration/model", "calibration/init", "calibration/acting"],
+    &["calibration/report", "calibration/sweep", "calibration/demonstrations", "calibration/keys"],
+    &["calibration/demo"],
+    &["calibration/cli"],
+];
+
+/// Clients of the same engine: neither needs the other.
+const PEERS: [&str; 2] = ["calibration/identify", "calibration/diagnose"];
+
+/// An arrow that goes up, or to a peer, and why it is still there.
+struct NotYet {
+    from: &'static str,
+    to: &'static str,
+    why: &'static str,
+}
+
+const RESULTS: &str = "results still hold figures and words of pages";
+const ERROR: &str = "the error of a diagnosis stands beside the whole of it, in diagnose/mod.rs";
+const ADMITTED: &str = "clips are admitted and split by both in their own way";
+const BASELINE: &str = "the baseline is still identified by the other client";
+
+const NOT_YET: &[NotYet] = &[
+    NotYet { from: "calibration/diagnose/against", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/diagnose/answer", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/diagnose/conclude", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/diagnose/fit", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/diagnose/judge", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/diagnose/propose", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/diagnose/search", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/identify/answer", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/identify/arm", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/identify/joint", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/identify/object", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/identify/sheet", to: "calibration/page", why: RESULTS },
+    NotYet { from: "calibration/diagnose/against", to: "calibration/diagnose", why: ERROR },
+    NotYet { from: "calibration/diagnose/conclude", to: "calibration/diagnose", why: ERROR },
+    NotYet { from: "calibration/diagnose/judge", to: "calibration/diagnose", why: ERROR },
+    NotYet { from: "calibration/diagnose/clips", to: "calibration/identify/object", why: ADMITTED },
+    NotYet { from: "calibration/diagnose/clips", to: "calibration/identify/remarks", why: ADMITTED },
+    NotYet { from: "calibration/diagnose/search", to: "calibration/identify/arm", why: BASELINE },
+    NotYet { from: "calibration/diagnose/search", to: "calibration/identify/object", why: BASELINE },
+    NotYet { from: "calibration/diagnose", to: "calibration/identify/arm", why: BASELINE },
+];
+
+/// An idea that has one home in `calibration`.
+struct One {
+    idea: &'static str,
+    /// Where it is said in code.
+    said: &'static [&'static str],
+    home: &'static str,
+    /// Files that still say it once more.
+    also: &'static [&'static str],
+}
+
+const ONES: &[One] = &[
+    One {
+        idea: "the median",
+        said: &["fn median("],
+        home: "calibration/inference/src/statistics.rs",
+        also: &["calibration/src/check/statistics.rs", "calibration/vision/src/viewpoint/refine.rs"],
+    },
+    One { idea: "Student's t", said: &["StudentsT"], home: "calibration/inference/src/statistics.rs", also: &[] },
+    One {
+        idea: "the penalty of random effects",
+        said: &["fn penalty("],
+        home: "calibration/inference/src/estimate/problem.rs",
+        also: &["calibration/src/diagnose/evidence/scatter.rs"],
+    },
+    One {
+        idea: "rows of an arm's clips",
+        said: &["struct ArmClips"],
+        home: "calibration/inference/src/forward/arm/mod.rs",
+        also: &["calibration/src/diagnose/evidence/arm_clips.rs"],
+    },
+    One {
+        idea: "a damped step within bounds",
+        said: &["fn bounded_step("],
+        home: "calibration/inference/src/estimate/bounded.rs",
+        also: &[],
+    },
+];
+
+/// The longest room that a module lies in.
+fn room(path: &str) -> Option<&'static str> {
+    let holds = |room: &str| path == room || path.strip_prefix(room).is_some_and(|rest| rest.starts_with('/'));
+    FLOORS.iter().copied().flatten().copied().filter(|room| holds(room)).max_by_key(|room| room.len())
+}
+
+fn floor(room: &str) -> usize {
+    FLOORS.iter().position(|rooms| rooms.contains(&room)).expect("a room of the table")
+}
+
+/// The module of a file with the name of its crate before it, for the two crates that have rooms.
+fn module_of(file: &str) -> Option<Vec<String>> {
+    let rooms = [("inference", "calibration/inference/src/"), ("calibration", "calibration/src/")];
+    let (name, own) = rooms.iter().find_map(|(name, folder)| Some((*name, module(file.strip_prefix(folder)?)?)))?;
+    Some([vec![name.to_owned()], own].concat())
+}
+
+/// Every arrow between rooms, each with a file that it starts in.
+fn arrows() -> BTreeSet<[String; 3]> {
+    let files = product_without_tests(&root());
+    let modules: Vec<(Vec<String>, &Source)> =
+        files.iter().filter_map(|source| Some((module_of(&source.file)?, source))).collect();
+    let known: BTreeSet<&[String]> =
+        modules.iter().flat_map(|(own, _)| (1..=own.len()).map(|length| &own[..length])).collect();
+    let mut found = BTreeSet::new();
+    for (own, source) in &modules {
+        let text = source.code_text();
+        let inside = needed(&own[1..], &text).into_iter().map(|path| [vec![own[0].clone()], path].concat());
+        let of_inference = paths(&text, "inference").into_iter();
+        let Some(from) = room(&own.join("/")) else { continue };
+        for mut to in inside.chain(of_inference) {
+            while !known.contains(&to[..]) {
+                to.pop();
+            }
+            if let Some(to) = room(&to.join("/")).filter(|to| *to != from) {
+                found.insert([from.to_owned(), to.to_owned(), source.file.clone()]);
+            }
+        }
+    }
+    found
+}
+
+/// Whether the plan allows an arrow: downwards, and from no peer to another.
+fn is_allowed(from: &str, to: &str) -> bool {
+    let [own, other] = [from, to].map(|room| PEERS.iter().position(|peer| room.starts_with(peer)));
+    floor(to) < floor(from) && (own == other || own.is_none() || other.is_none())
+}
+
+#[test]
+fn code_stands_in_the_houses_of_the_plan_alone() {
+    let ends_as_code = |name: &str| name.rsplit_once('.').is_some_and(|(_, end)| CODE.contains(&end));
+    for entry in std::fs::read_dir(root()).expect("the tree").map(|entry| entry.expect("an entry")) {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.path().is_dir() {
+            let is_known = TOP.contains(&name.as_str()) || name.starts_with('.') || name == "target";
+            assert!(is_known, "{name}/ stands at the top of the tree; houses are {}", TOP.join(", "));
+        } else {
+            assert!(!ends_as_code(&name), "{name} is code at the top of the tree");
+        }
+    }
+    for house in ["config", "docs"] {
+        let code = below(&root(), house);
+        assert!(code.is_empty(), "{house} holds code: {:?}", code.iter().map(|s| &s.file).collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn every_crate_stands_in_the_table_and_needs_what_it_says() {
+    let files = product_without_tests(&root());
+    for (number, own) in CRATES.iter().enumerate() {
+        let manifest = std::fs::read_to_string(root().join(own.folder).join("Cargo.toml")).expect("a manifest");
+        let before = &CRATES[..number];
+        for need in own.needs {
+            assert!(before.iter().any(|other| other.name == *need), "{} needs {need}, which stands above it", own.name);
+        }
+        for other in CRATES.iter().filter(|other| other.name != own.name && !own.needs.contains(&other.name)) {
+            let declared = manifest.lines().any(|line| {
+                let name = line.split(['.', ' ', '=']).next().unwrap_or("").replace('-', "_");
+                name == other.name && line.contains('=')
+            });
+            assert!(!declared, "{}/Cargo.toml names {}, which {} may not need", own.folder, other.name, own.name);
+            let sources = format!("{}/src/", own.folder);
+            for source in files.iter().filter(|source| source.file.starts_with(&sources)) {
+                // A module may have a crate's name, as in `crate::link`.
+                let text = source.code_text();
+                let used = text.lines().any(|line| {
+                    let path = format!("{}::", other.name);
+                    let used = line.trim_start().strip_prefix("use ").is_some_and(|used| used.starts_with(&path));
+                    used && !text.contains(&format!("mod {};", other.name))
+                });
+                assert!(!used, "{} needs {}, which {} may not", source.file, other.name, own.name);
+            }
+        }
+    }
+    let members = std::fs::read_to_string(root().join("Cargo.toml")).expect("Cargo.toml");
+    let members = members.split_once("members = [").and_then(|(_, rest)| rest.split_once(']')).expect("members").0;
+    for member in members.split('"').skip(1).step_by(2).filter(|member| *member != "tests") {
+        assert!(CRATES.iter().any(|own| own.folder == member), "{member} stands in no line of the table");
+    }
+}
+
+#[test]
+fn every_module_of_inference_and_calibration_lies_in_a_room() {
+    for source in product_without_tests(&root()) {
+        let Some(own) = module_of(&source.file).filter(|own| own.len() > 1) else { continue };
+        assert!(room(&own.join("/")).is_some(), "{} lies in no room of the table", source.file);
+    }
+}
+
+#[test]
+fn rooms_need_those_below_them_alone() {
+    let arrows = arrows();
+    let against: Vec<&[String; 3]> = arrows.iter().filter(|[from, to, _]| !is_allowed(from, to)).collect();
+    let unknown: Vec<String> = against
+        .iter()
+        .filter(|[from, to, _]| !NOT_YET.iter().any(|known| known.from == from && known.to == to))
+        .map(|[from, to, file]| format!("{from} -> {to} ({file})"))
+        .collect();
+    assert!(unknown.is_empty(), "arrows against the plan:\n{}", unknown.join("\n"));
+    for known in NOT_YET {
+        let is_there = against.iter().any(|[from, to, _]| known.from == from && known.to == to);
+        if !is_there {
+            eprintln!("{} needs {} no longer: its line ({}) can go", known.from, known.to, known.why);
+        }
+    }
+}
+
+#[test]
+fn of_each_idea_there_is_one() {
+    let files = product_without_tests(&root());
+    for one in ONES {
+        let says = |source: &&Source| source.code().any(|line| one.said.iter().any(|said| line.contains(said)));
+        let ours = files.iter().filter(|source| source.file.starts_with("calibration/"));
+        let found: Vec<&str> = ours.filter(says).map(|source| source.file.as_str()).collect();
+        for file in &found {
+            let known = *file == one.home || one.also.contains(file);
+            assert!(known, "{file} has {} once more; its home is {}", one.idea, one.home);
+        }
+        assert!(found.contains(&one.home), "{} holds {} no longer: where is it?", one.home, one.idea);
+        for file in one.also.iter().filter(|file| !found.contains(file)) {
+            eprintln!("{file} has {} no longer: its line can go", one.idea);
+        }
+    }
+}
