@@ -1,7 +1,7 @@
 //! What stands around the point that a scan looks at: every object of the cell beside the one that is scanned, where it was seen last,
 //! or, unseen, where cell.toml has it start. Base frame; m.
 
-use super::obstacle::{KEPT, Obstacle, corners};
+use super::obstacle::{OBJECT_CLEARANCE, Obstacle, corners};
 use nalgebra::{Isometry3, Point3};
 use shared_mem::cell::Cell;
 use shared_mem::console;
@@ -102,7 +102,7 @@ impl Around {
     /// Leaves out the object that stands at a point.
     fn leave_out(&mut self, at: &Point3<f64>) {
         let gaps = self.others.iter().map(|other| (other.obstacle().gap(at, 0.0).0, other.object));
-        let nearest = gaps.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(gap, _)| *gap < KEPT);
+        let nearest = gaps.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(gap, _)| *gap < OBJECT_CLEARANCE);
         self.others.retain(|other| nearest.is_none_or(|(_, scanned)| other.object != scanned));
     }
 

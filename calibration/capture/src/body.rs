@@ -8,9 +8,9 @@ use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::{ArmBalls, ArmModel, JointState, ModelError};
 
 /// Balls of a link are joined by balls no farther apart than their radius, or this where nobody knows how thick it is [m].
-const THIN: f64 = 0.01;
+const MAX_BALL_SPACING: f64 = 0.01;
 /// A ball that holds a depth camera with its mount: half the length of the longest, a D455's 124 mm [m].
-const CAMERA: f64 = 0.065;
+const CAMERA_RADIUS: f64 = 0.065;
 
 /// The nominal arm with its tool.
 #[derive(Debug, Clone)]
@@ -62,13 +62,13 @@ impl Body {
         let tool = balls.len().saturating_sub(2);
         let mut all = Vec::with_capacity(4 * balls.len());
         let camera = self.camera.map(|mount| (self.model.flange(q).isometry() * mount).translation.vector);
-        all.extend(camera.map(|centre| (centre.into(), CAMERA)));
+        all.extend(camera.map(|centre| (centre.into(), CAMERA_RADIUS)));
         for (i, (link, centre, radius)) in balls.iter().enumerate() {
             all.push((*centre, *radius));
             for (k, (of, other, wide)) in balls.iter().enumerate().skip(i + 1) {
                 let is_line = *radius == 0.0 && k == i + 1;
                 if (of == link && (i >= tool) == (k >= tool)) || is_line {
-                    let steps = ((other - centre).norm() / radius.min(*wide).max(THIN)).ceil() as u32;
+                    let steps = ((other - centre).norm() / radius.min(*wide).max(MAX_BALL_SPACING)).ceil() as u32;
                     all.extend((1..steps).map(|step| {
                         let share = f64::from(step) / f64::from(steps);
                         (centre + (other - centre) * share, radius + (wide - radius) * share)

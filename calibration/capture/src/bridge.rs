@@ -10,9 +10,9 @@ use std::path::Path;
 use std::time::Duration;
 
 /// How long to look for a running bridge.
-const LOOK: Duration = Duration::from_millis(500);
+const FIND_TIMEOUT: Duration = Duration::from_millis(500);
 /// How long a bridge may take to its first arm state: a robot has to be reached and its brakes opened.
-const START: Duration = Duration::from_secs(30);
+const START_TIMEOUT: Duration = Duration::from_secs(30);
 /// The simulated arm, which alone holds a simulated camera.
 const SIMULATED: &str = "sim";
 
@@ -39,7 +39,7 @@ pub enum BridgeError {
         arm: String,
     },
     /// It runs but reports no arm.
-    #[error("the bridge reported no arm state within {} s; check the robot's address and whether it is unlocked, then start again", START.as_secs())]
+    #[error("the bridge reported no arm state within {} s; check the robot's address and whether it is unlocked, then start again", START_TIMEOUT.as_secs())]
     NoState,
     /// The user gave up first.
     #[error("ended before the bridge was ready")]
@@ -78,7 +78,7 @@ impl Bridge {
         admission: &Admission,
         interrupt: &Interrupt,
     ) -> Result<Self, BridgeError> {
-        if let Some(state) = link.wait_for_bridge(LOOK, || interrupt.asked())? {
+        if let Some(state) = link.wait_for_bridge(FIND_TIMEOUT, || interrupt.asked())? {
             return Self::running(state.origin.origin(), wanted.arm, admission);
         }
         let arm = admission.arm(wanted.arm)?;
@@ -145,7 +145,7 @@ impl Bridge {
     /// Waits for the first arm state of a bridge that was started.
     fn wait_until_alive(&mut self, link: &mut Link, interrupt: &Interrupt) -> Result<(), BridgeError> {
         let mut dead = None;
-        let state = link.wait_for_bridge(START, || {
+        let state = link.wait_for_bridge(START_TIMEOUT, || {
             dead = self.check().err();
             dead.is_some() || interrupt.asked()
         })?;

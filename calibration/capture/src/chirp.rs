@@ -6,16 +6,16 @@
 //! acceleration is limited can follow up to the highest frequency. Derivatives are analytic.
 
 use super::jet::{Jet, product, window};
-use super::limits::SHARE;
+use super::limits::LIMITS_SHARE;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
 use twin::arm::JointLimits;
 
 /// Rise and fall of the window at the ends [s].
-const RISE: f64 = 1.0;
+const WINDOW_RISE: f64 = 1.0;
 /// Share of what a motion may accelerate that the sweep settles at; the rest is for its window and for the other joints' pull.
-const STEADY: f64 = 0.6;
+const STEADY_SHARE: f64 = 0.6;
 
 /// A sweep of all joints.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +42,7 @@ impl Chirp {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let swing = |limit: &JointLimits| Swing {
             phase: rng.random_range(0.0..TAU),
-            corner: (STEADY * SHARE * limit.acceleration / amplitude).sqrt(),
+            corner: (STEADY_SHARE * LIMITS_SHARE * limit.acceleration / amplitude).sqrt(),
         };
         let joints = limits.iter().map(swing).collect();
         let growth = (frequency[1] / frequency[0]).ln() / duration;
@@ -63,7 +63,7 @@ impl Chirp {
         let d1 = -2.0 * k * r * a * a;
         let d2 = -2.0 * k * (2.0 * k * r * a * a + 2.0 * r * a * d1);
         let d3 = -2.0 * k * (4.0 * k * k * r * a * a + 8.0 * k * r * a * d1 + 2.0 * r * (d1 * d1 + a * d2));
-        let rise = RISE.min(0.25 * self.duration);
+        let rise = WINDOW_RISE.min(0.25 * self.duration);
         product([a, d1, d2, d3].map(|x| self.amplitude * x), product(wave, window(t, self.duration, rise)))
     }
 }

@@ -33,9 +33,9 @@ use twin::arm::JointLimits;
 use twin::scene::ObjectModel;
 
 /// The tool travels this far above the object, and no lower than half of it [m].
-const ABOVE: f64 = 0.08;
+const TRAVEL_CLEARANCE: f64 = 0.08;
 /// Further tries for every clip that is asked for.
-const AGAIN: f64 = 0.5;
+const EXTRA_TRIES_SHARE: f64 = 0.5;
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -144,7 +144,7 @@ impl<'a> CaptureContext<'a> {
     fn clips(&mut self, link: &mut Link, object: &mut ObjectWatch) -> anyhow::Result<Vec<ClipSummary>> {
         let mut clips: Vec<ClipSummary> = Vec::new();
         let wanted = self.options.task.clips as usize;
-        let tries = wanted + (AGAIN * wanted as f64).ceil() as usize;
+        let tries = wanted + (EXTRA_TRIES_SHARE * wanted as f64).ceil() as usize;
         let mut staged = self.staged(object)?;
         while clips.iter().filter(|clip| !clip.paused).count() < tries {
             self.interrupt.wait_out_pause();
@@ -393,7 +393,13 @@ impl<'a> CaptureContext<'a> {
 
     fn ways<'b>(&'b self, obstacles: &'b [Obstacle]) -> Ways<'b> {
         let top = self.cell.table.as_ref().map_or(0.0, |table| table.height) + self.size[2];
-        Ways { body: self.body, limits: self.limits, height: top + ABOVE, floor: top + 0.5 * ABOVE, obstacles }
+        Ways {
+            body: self.body,
+            limits: self.limits,
+            height: top + TRAVEL_CLEARANCE,
+            floor: top + 0.5 * TRAVEL_CLEARANCE,
+            obstacles,
+        }
     }
 
     fn play(

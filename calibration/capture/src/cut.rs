@@ -6,9 +6,9 @@ use shared_mem::cell::Intrinsics;
 use shared_mem::msg::image::{ImageHeader, PixelEncoding};
 
 /// One sigma of a stereo camera's depth over its square [1/m]: half a per cent at 1 m, the usual figure of a D455.
-const NOISE: f64 = 0.005;
+const DEPTH_NOISE: f64 = 0.005;
 /// What is fewer sigmas of depth above the table is the table.
-const SIGMAS: f64 = 3.0;
+const MIN_HEIGHT_SIGMAS: f64 = 3.0;
 
 /// What is cut out.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +33,7 @@ impl Cut {
             let z = f64::from(u16::from_le_bytes([bytes[0], bytes[1]])) * scale;
             let (u, v) = ((place % width) as f64, (place / width) as f64);
             let point = base_from_camera * Point3::new((u - cx) / fx * z, (v - cy) / fy * z, z);
-            let above = point.z > self.table + SIGMAS * NOISE * z * z;
+            let above = point.z > self.table + MIN_HEIGHT_SIGMAS * DEPTH_NOISE * z * z;
             [if z > 0.0 && above && (point - self.at).norm() < self.radius { 255 } else { 0 }; 3]
         };
         let bytes = depth.bytes.chunks_exact(2).enumerate().flat_map(label).collect();

@@ -49,15 +49,15 @@ pub enum NoWay {
 /// Lowest and highest elevation of the camera above the point's level [rad].
 const ELEVATIONS: [f64; 2] = [0.2, 1.45];
 /// Places that are tried for each that is wanted: most lie behind the object or too low.
-const TRIED: usize = 6;
+const CANDIDATES_PER_VIEW: usize = 6;
 /// Turns of the camera about its own axis that are tried.
 const ROLLS: usize = 12;
 /// Joints stay this far inside their stops [rad].
-const MARGIN: f64 = 0.05;
+const JOINT_MARGIN: f64 = 0.05;
 /// Flange, tool and camera stay this share of the distance away from the point.
-const AWAY: f64 = 0.5;
+const MIN_DISTANCE_SHARE: f64 = 0.5;
 /// Set points between two looks at how near the arm is.
-const LOOK: usize = 20;
+const CHECKED_EVERY: usize = 20;
 
 /// A camera at `from` that looks at `at`, its rows level but for a `roll` about its own axis.
 pub fn looking(from: &Point3<f64>, at: &Point3<f64>, roll: f64) -> Isometry3<f64> {
@@ -73,7 +73,7 @@ impl Dome<'_> {
     /// At most `wanted` views spread over the dome, of those to which a straight way leads from `start` inside every limit: from any
     /// of them that is free each other one is reached over there.
     pub fn views(&self, body: &Body, limits: &[JointLimits], start: &Joints, wanted: usize) -> Views {
-        let reached = self.places(TRIED * wanted).filter_map(|place| {
+        let reached = self.places(CANDIDATES_PER_VIEW * wanted).filter_map(|place| {
             let view = self.view(body, limits, start, &place)?;
             Some((place, view))
         });
@@ -154,7 +154,8 @@ impl Dome<'_> {
     ) -> Option<Joints> {
         let target = looking(place, &self.at, roll);
         let joints = body.model().reach(start, &self.flange_from_camera, &target, None)?;
-        let inside = limits.iter().zip(&joints).all(|(l, q)| (l.q_min + MARGIN..=l.q_max - MARGIN).contains(q));
+        let inside =
+            limits.iter().zip(&joints).all(|(l, q)| (l.q_min + JOINT_MARGIN..=l.q_max - JOINT_MARGIN).contains(q));
         (inside && self.is_free(body, &joints)).then_some(joints)
     }
 
@@ -165,7 +166,7 @@ impl Dome<'_> {
         let tool = body.model().tool_length();
         let away = [0.0, 0.5, 1.0].map(|share| (flange * Point3::new(0.0, 0.0, share * tool) - self.at).norm());
         let away = away.into_iter().fold((camera - self.at).norm(), f64::min);
-        body.lowest_point(q) >= self.floor && camera.z >= self.floor && away >= AWAY * self.distance
+        body.lowest_point(q) >= self.floor && camera.z >= self.floor && away >= MIN_DISTANCE_SHARE * self.distance
     }
 
     /// From rest to rest inside every limit, above the floor, away from the point and clear of other objects; a way that begins near
@@ -175,7 +176,7 @@ impl Dome<'_> {
     /// [`NoWay`] where the straight way is none.
     pub fn way(&self, body: &Body, limits: &[JointLimits], from: &Joints, to: &Joints) -> Result<Vec<SetPoint>, NoWay> {
         let way = transit::plan(from, to, limits, 1.0).ok_or(NoWay::Outside)?;
-        let free = way.iter().step_by(LOOK).chain(way.last()).all(|point| self.is_free(body, &point.q_d));
+        let free = way.iter().step_by(CHECKED_EVERY).chain(way.last()).all(|point| self.is_free(body, &point.q_d));
         if !free || first_excess(&way, limits, Some(body)).is_some() {
             return Err(NoWay::Outside);
         }

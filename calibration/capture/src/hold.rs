@@ -13,17 +13,17 @@ use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::JointLimits;
 
 /// Poses that are looked at for each that is wanted.
-const DRAWN: usize = 60;
+const CANDIDATES_PER_POSE: usize = 60;
 /// How far beside a pose the arm turns round before it comes to rest there [rad].
-const BESIDE: f64 = 0.05;
+const REVERSAL_OFFSET: f64 = 0.05;
 /// Shortest rest that shows a sag [s].
 const SHORTEST_REST: f64 = 0.3;
 /// A move between poses is no faster [rad/s] ...
-const SPEED: f64 = 0.6;
+const MAX_SPEED: f64 = 0.6;
 /// ... nor accelerates more [rad/s²].
-const ACCELERATION: f64 = 2.5;
+const MAX_ACCELERATION: f64 = 2.5;
 /// No move takes less time [s].
-const SHORTEST: f64 = 0.4;
+const MIN_MOVE_TIME: f64 = 0.4;
 /// Peaks of the quintic's first and second derivative.
 const PEAKS: [f64; 2] = [1.875, 5.774];
 
@@ -71,10 +71,10 @@ impl Hold {
         refuse: impl Fn(&Joints) -> Option<Excess>,
     ) -> Result<Self, Excess> {
         let mut rng = Pcg64Mcg::seed_from_u64(wanted.seed);
-        let beside = BESIDE.min(0.25 * wanted.amplitude);
+        let beside = REVERSAL_OFFSET.min(0.25 * wanted.amplitude);
         let reach = wanted.amplitude - beside;
         let (mut free, mut first) = (Vec::new(), None);
-        for _ in 0..DRAWN * wanted.poses {
+        for _ in 0..CANDIDATES_PER_POSE * wanted.poses {
             let offset = joints(&wanted.moving, |_| rng.random_range(-reach..reach));
             let around = [beside, -beside, 0.0].map(|side| sum(&offset, &joints(&wanted.moving, |_| side)));
             match around.iter().find_map(|offset| refuse(&sum(&wanted.start, offset))) {
@@ -136,7 +136,7 @@ impl Hold {
 /// Time of a move [s].
 fn time(from: &Joints, to: &Joints) -> f64 {
     let way = from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    SHORTEST.max(PEAKS[0] * way / SPEED).max((PEAKS[1] * way / ACCELERATION).sqrt())
+    MIN_MOVE_TIME.max(PEAKS[0] * way / MAX_SPEED).max((PEAKS[1] * way / MAX_ACCELERATION).sqrt())
 }
 
 fn joints(moving: &[bool; MAX_JOINTS], mut value: impl FnMut(usize) -> f64) -> Joints {

@@ -9,7 +9,7 @@ use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::{JointLimits, JointState, Limits};
 
 /// Share of each limit a motion may use; the rest is for the arm that does not follow exactly.
-pub const SHARE: f64 = 0.9;
+pub const LIMITS_SHARE: f64 = 0.9;
 
 /// Limits of the cell's arm, joint by joint.
 pub fn of(cell: &Cell, body: &Body) -> Vec<JointLimits> {
@@ -41,11 +41,11 @@ pub fn first_excess(points: &[SetPoint], limits: &[JointLimits], body: Option<&B
             let checks = [
                 (position, q, limits.q_max),
                 (position, -q, -limits.q_min),
-                (Quantity::Speed, dq, SHARE * fastest),
-                (Quantity::Speed, -dq, -SHARE * slowest),
-                (Quantity::Acceleration, ddq[joint].abs(), SHARE * limits.acceleration),
-                (Quantity::Jerk, jerk.abs(), SHARE * limits.jerk),
-                (Quantity::Torque, torque, SHARE * limits.torque),
+                (Quantity::Speed, dq, LIMITS_SHARE * fastest),
+                (Quantity::Speed, -dq, -LIMITS_SHARE * slowest),
+                (Quantity::Acceleration, ddq[joint].abs(), LIMITS_SHARE * limits.acceleration),
+                (Quantity::Jerk, jerk.abs(), LIMITS_SHARE * limits.jerk),
+                (Quantity::Torque, torque, LIMITS_SHARE * limits.torque),
             ];
             let broken = checks.into_iter().find(|(_, value, limit)| value > limit);
             broken.map(|(quantity, value, limit)| Excess { joint: Some(joint), quantity, value, limit })

@@ -9,13 +9,13 @@ use shared_mem::msg::Joints;
 use shared_mem::msg::motion::SetPoint;
 
 /// Peak speed of the quintic rest-to-rest course over its mean.
-const PEAK: f64 = 1.875;
+const QUINTIC_PEAK_SPEED: f64 = 1.875;
 /// How fast the tool turns on a way at most [rad/s].
-const TURN: f64 = 0.5;
+const MAX_TURN_SPEED: f64 = 0.5;
 /// How far the tool is turned about its own axis between two looks at the joints [rad].
 const TURN_STEP: f64 = 0.15;
 /// No way takes less time [s].
-const SHORTEST: f64 = 0.2;
+const MIN_DURATION: f64 = 0.2;
 
 /// Joints that bring the tool's end to `target`, the nearest ones to `from`; `None` out of reach.
 pub fn reach(body: &Body, from: &Joints, target: &Isometry3<f64>) -> Option<Joints> {
@@ -56,7 +56,7 @@ pub fn travel(body: &Body, from: &Joints, end: &Isometry3<f64>, speed: f64) -> O
     let start = body.model().tip(from).isometry();
     let shift = end.translation.vector - start.translation.vector;
     let turn = (end.rotation * start.rotation.inverse()).scaled_axis();
-    let duration = (PEAK * (shift.norm() / speed).max(turn.norm() / TURN)).max(SHORTEST);
+    let duration = (QUINTIC_PEAK_SPEED * (shift.norm() / speed).max(turn.norm() / MAX_TURN_SPEED)).max(MIN_DURATION);
     let cycles = (duration * RATE).ceil() as usize;
     let mut q = *from;
     let mut points = Vec::with_capacity(cycles + 1);

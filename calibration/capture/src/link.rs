@@ -2,7 +2,7 @@
 //!
 //! Knows no physics. A bridge that falls silent or starts anew is an error with its remedy, never a wait without end.
 
-use super::quality::{FAST, GAINS, LOOSE};
+use super::quality::{GAINS, MAX_REST_ERROR, MAX_REST_SPEED};
 use shared_mem::console;
 use shared_mem::msg::arm::{ArmMode, ArmState};
 use shared_mem::msg::event::{Event, EventLevel, EventSource};
@@ -13,9 +13,9 @@ use shared_mem::transport::{Node, Publisher, Subscriber, TransportError};
 use std::time::{Duration, Instant};
 
 /// A bridge that says nothing for this long is gone.
-const SILENCE: Duration = Duration::from_secs(1);
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(1);
 /// How long a bridge may take to recover a robot from a reflex: brakes close and open. It says nothing meanwhile.
-const RECOVERY: Duration = Duration::from_secs(15);
+const RECOVERY_TIMEOUT: Duration = Duration::from_secs(15);
 
 /// The link to a bridge failed, or the bridge cannot be used as it is.
 #[derive(Debug, thiserror::Error)]
@@ -121,7 +121,7 @@ impl Link {
     pub fn next_state(&mut self) -> Result<Option<ArmState>, LinkError> {
         self.listen()?;
         let Some(state) = self.states.receive()? else {
-            if self.heard.elapsed() > SILENCE {
+            if self.heard.elapsed() > SILENCE_TIMEOUT {
                 return Err(LinkError::Silent { last_words: self.last_words() });
             }
             return Ok(None);
@@ -207,7 +207,7 @@ impl Link {
         }
         let joints = (0..described.min(state.q.len()))
             .map(|joint| (joint, (state.q_d[joint] - state.q[joint]).abs(), state.dq[joint].abs()));
-        let holds = |off: f64, speed: f64| off <= LOOSE && speed <= FAST;
+        let holds = |off: f64, speed: f64| off <= MAX_REST_ERROR && speed <= MAX_REST_SPEED;
         let loose = joints.filter(|(_, off, speed)| !holds(*off, *speed)).max_by(|a, b| a.2.total_cmp(&b.2));
         match loose {
             Some((joint, off, speed)) => Err(LinkError::DoesNotHold { joint, off, speed }),
@@ -227,7 +227,7 @@ impl Link {
             self.last_words = None;
             self.send(&MotionChunk { stamp_ns: now_ns(), kind: MotionKind::Recover, ..MotionChunk::default() })?;
             let asked = Instant::now();
-            while is_in_reflex(self.newest) && self.last_words.is_none() && asked.elapsed() < RECOVERY {
+            while is_in_reflex(self.newest) && self.last_words.is_none() && asked.elapsed() < RECOVERY_TIMEOUT {
                 std::thread::sleep(Duration::from_millis(5));
                 self.listen()?;
                 self.newest = self.states.newest()?.or(self.newest);

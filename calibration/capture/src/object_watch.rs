@@ -16,17 +16,17 @@ use std::time::{Duration, Instant};
 use twin::scene::{CellBody, MeshFileError, cell_bodies};
 
 /// Poses that say whether it stands still: those of so long a time [s].
-const WINDOW: f64 = 0.4;
+const WINDOW_TIME: f64 = 0.4;
 /// ... and at least so many.
-const FEWEST: usize = 6;
+const MIN_POSES: usize = 6;
 /// The halves of the window agree to this where it stands still [m, rad].
-const STILL: [f64; 2] = [1e-3, 0.01];
+const MAX_STILL_MOTION: [f64; 2] = [1e-3, 0.01];
 /// No pose for so long: nobody tracks.
-const SILENCE: Duration = Duration::from_secs(3);
+const POSE_TIMEOUT: Duration = Duration::from_secs(3);
 /// A pose is missing where two are further apart than so many of the usual distances.
-const MISSING: f64 = 2.5;
+const MAX_GAP_RATIO: f64 = 2.5;
 /// Another object was moved where the means of so many poses before a clip and at its end are so far apart [m, rad].
-const ENDS: usize = 6;
+const AVERAGED_POSES: usize = 6;
 const ALSO_MOVED: [f64; 2] = [3e-3, 0.03];
 
 /// The object cannot be followed.
@@ -124,7 +124,7 @@ impl ObjectWatch {
     pub fn begin(&mut self) {
         self.seen.clear();
         for Other { seen, .. } in &mut self.others {
-            seen.drain(..seen.len().saturating_sub(ENDS));
+            seen.drain(..seen.len().saturating_sub(AVERAGED_POSES));
         }
     }
 
@@ -206,7 +206,7 @@ impl ObjectWatch {
             if let (Some(standing), None) = (standing, moving) {
                 return Ok(Some(standing));
             }
-            if start.elapsed() > SILENCE {
+            if start.elapsed() > POSE_TIMEOUT {
                 if self.seen.len() == known {
                     return Err(self.of_this(WatchError::NoPoses, WatchError::NoPosesOf));
                 }
@@ -250,7 +250,7 @@ impl ObjectWatch {
     pub fn others(&self) -> Vec<(ObjectName, Isometry3<f64>)> {
         let of = |other: &Other| {
             let last = other.pose?;
-            let seen = &other.seen[other.seen.len().saturating_sub(ENDS)..];
+            let seen = &other.seen[other.seen.len().saturating_sub(AVERAGED_POSES)..];
             let Some(mean) = (!seen.is_empty()).then(|| mean(seen)) else { return Some((other.name, last)) };
             let turn = between(mean.yaw, last.rotation.euler_angles().2);
             let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn) * last.rotation;
@@ -293,7 +293,7 @@ fn mean(seen: &[Seen]) -> Seen {
 
 /// How far the last poses are from the first ones [m], and by how much they are turned [rad]; `None` without poses.
 fn between_ends(seen: &[Seen]) -> Option<[f64; 2]> {
-    let count = ENDS.min(seen.len());
+    let count = AVERAGED_POSES.min(seen.len());
     if count == 0 {
         return None;
     }
@@ -304,23 +304,25 @@ fn between_ends(seen: &[Seen]) -> Option<[f64; 2]> {
 
 fn still(seen: &[Seen]) -> Option<Standing> {
     let last = seen.last()?.time;
-    let recent = &seen[seen.partition_point(|s| s.time < last - WINDOW)..];
-    let whole = seen[0].time <= last - WINDOW;
-    if !whole || recent.len() < FEWEST {
+    let recent = &seen[seen.partition_point(|s| s.time < last - WINDOW_TIME)..];
+    let whole = seen[0].time <= last - WINDOW_TIME;
+    if !whole || recent.len() < MIN_POSES {
         return None;
     }
     let [before, after] = [mean(&recent[..recent.len() / 2]), mean(&recent[recent.len() / 2..])];
     let moved = (0..3).map(|axis| (after.place[axis] - before.place[axis]).powi(2)).sum::<f64>().sqrt();
     let turned = between(after.yaw, before.yaw).abs();
     let all = mean(recent);
-    (moved < STILL[0] && turned < STILL[1]).then_some(Standing { place: [all.place[0], all.place[1]], yaw: all.yaw })
+    (moved < MAX_STILL_MOTION[0] && turned < MAX_STILL_MOTION[1])
+        .then_some(Standing { place: [all.place[0], all.place[1]], yaw: all.yaw })
 }
 
 fn quality(seen: &[Seen]) -> PoseQuality {
     let (Some(first), Some(last)) = (seen.first(), seen.last()) else { return PoseQuality::default() };
     let gaps: Vec<f64> = seen.windows(2).map(|w| w[1].time - w[0].time).collect();
     let usual = median(gaps.iter().copied()).unwrap_or(0.0);
-    let lost = |gap: &f64| if *gap > MISSING * usual && usual > 0.0 { (gap / usual).round() as usize - 1 } else { 0 };
+    let lost =
+        |gap: &f64| if *gap > MAX_GAP_RATIO * usual && usual > 0.0 { (gap / usual).round() as usize - 1 } else { 0 };
     PoseQuality {
         poses: seen.len(),
         lost_poses: gaps.iter().map(lost).sum(),

@@ -9,17 +9,17 @@ use twin::scene::CellBody;
 
 /// Arm, tool and a sliding object keep this far away from other objects [m]: more than an arm under control deviates and a
 /// tracker errs.
-pub const KEPT: f64 = 0.03;
+pub const OBJECT_CLEARANCE: f64 = 0.03;
 /// For each metre that an object slides it may come so far aside [m]: it is hit obliquely and beside its centre.
-const ASIDE: f64 = 0.3;
-/// A way that begins nearer to an object than [`KEPT`] may come nearer by this [m]: what a tracker errs between two looks.
-const NEARER: f64 = 2e-3;
+const SIDEWAYS_PER_METRE: f64 = 0.3;
+/// A way that begins nearer to an object than [`OBJECT_CLEARANCE`] may come nearer by this [m]: what a tracker errs between two looks.
+const TRACKER_ERROR: f64 = 2e-3;
 /// Set points between two looks at how near the arm is.
-const LOOK: usize = 5;
+const CHECKED_EVERY: usize = 5;
 /// Between two looks at how near what slides is [m].
-const STEP: f64 = 5e-3;
+const SLIDE_STEP: f64 = 5e-3;
 /// A remedy is given in steps of this [m].
-const REMEDY: f64 = 5e-3;
+const REMEDY_STEP: f64 = 5e-3;
 
 /// An object that nothing may touch.
 #[derive(Debug, Clone, PartialEq)]
@@ -124,9 +124,11 @@ pub fn highest(obstacles: &[Obstacle]) -> Option<f64> {
 /// may go away from there.
 pub fn on_motion(obstacles: &[Obstacle], body: &Body, points: &[SetPoint], leaves: bool) -> Option<Blocked> {
     let first = body.balls(&points.first().filter(|_| !obstacles.is_empty())?.q_d);
-    let kept = |obstacle: &Obstacle| if leaves { KEPT.min(obstacle.gap_to_arm(&first).0 - NEARER) } else { KEPT };
+    let kept = |obstacle: &Obstacle| {
+        if leaves { OBJECT_CLEARANCE.min(obstacle.gap_to_arm(&first).0 - TRACKER_ERROR) } else { OBJECT_CLEARANCE }
+    };
     let kept: Vec<f64> = obstacles.iter().map(kept).collect();
-    let poses = points.iter().step_by(LOOK).chain(points.last()).map(|point| body.balls(&point.q_d));
+    let poses = points.iter().step_by(CHECKED_EVERY).chain(points.last()).map(|point| body.balls(&point.q_d));
     let found = poses.flat_map(|balls| {
         let near = |(obstacle, kept): (&Obstacle, &f64)| {
             let (gap, away) = obstacle.gap_to_arm(&balls);
@@ -147,10 +149,10 @@ pub fn on_motion(obstacles: &[Obstacle], body: &Body, points: &[SetPoint], leave
 pub fn on_slide(obstacles: &[Obstacle], what: &str, [from, to]: [[f64; 2]; 2], radius: f64) -> Option<Blocked> {
     let (from, to) = (Point2::from(from), Point2::from(to));
     let length = (to - from).norm();
-    let steps = (length / STEP).ceil().max(1.0) as usize;
+    let steps = (length / SLIDE_STEP).ceil().max(1.0) as usize;
     let places = (0..=steps).map(|k| k as f64 / steps as f64);
     let found = places.flat_map(|share| {
-        let (place, kept) = (from + (to - from) * share, KEPT + ASIDE * length * share);
+        let (place, kept) = (from + (to - from) * share, OBJECT_CLEARANCE + SIDEWAYS_PER_METRE * length * share);
         obstacles.iter().filter_map(move |obstacle| {
             let (beside, away) = obstacle.beside(&place);
             let gap = beside - radius;
@@ -164,7 +166,7 @@ pub fn on_slide(obstacles: &[Obstacle], what: &str, [from, to]: [[f64; 2]; 2], r
 /// ball is a part of what is looked at.
 pub fn on_sight(obstacles: &[Obstacle], camera: &Point3<f64>, at: &Point3<f64>, radius: f64) -> Option<Blocked> {
     let way = at - camera;
-    let steps = (way.norm() / STEP).ceil().max(1.0) as usize;
+    let steps = (way.norm() / SLIDE_STEP).ceil().max(1.0) as usize;
     let found = obstacles.iter().filter(|obstacle| obstacle.gap(at, radius).0 >= 0.0).filter_map(|obstacle| {
         let shares = (0..=steps).map(|k| k as f64 / steps as f64);
         let gaps = shares.map(|share| obstacle.gap(&(camera + way * share), radius * share));
@@ -202,7 +204,7 @@ impl fmt::Display for Blocked {
             }
             false => write!(f, "{what} would run into `{name}`")?,
         }
-        let by = (self.lacks() / REMEDY).ceil() * REMEDY;
+        let by = (self.lacks() / REMEDY_STEP).ceil() * REMEDY_STEP;
         // What rounds to 0 has no sign.
         let [x, y] = [away.x, away.y].map(|share| mm(by * share).round() + 0.0);
         write!(f, "; move `{name}` away by about {:.0} mm ({x:+.0} mm along x, {y:+.0} mm along y)", mm(by))

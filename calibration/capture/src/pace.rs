@@ -5,17 +5,17 @@
 
 use super::body::Body;
 use super::excess::Excess;
-use super::limits::{SHARE, first_excess};
+use super::limits::{LIMITS_SHARE, first_excess};
 use super::rate::RATE;
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::{JointLimits, JointState};
 
 /// What is taken off the largest factor before it is named: between set points it is reckoned by interpolation.
-const MARGIN: f64 = 0.995;
+const PACE_MARGIN: f64 = 0.995;
 
 /// So little beyond the largest factor the limit is looked for that is met there.
-const BEYOND: f64 = 1.02;
+const EXCEEDED_PACE: f64 = 1.02;
 
 /// The motion cannot be played at that pace.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -48,7 +48,7 @@ pub fn paced(points: &[SetPoint], factor: f64, limits: &[JointLimits], body: &Bo
     let Some(excess) = first_excess(&paced, limits, Some(body)) else { return Ok(paced) };
     let largest = (100.0 * largest(points, limits, body)).floor() / 100.0;
     if largest > 0.0 && largest < factor && excess.quantity.eases() {
-        let beyond = resampled(&times, points, factor.min(BEYOND * largest));
+        let beyond = resampled(&times, points, factor.min(EXCEEDED_PACE * largest));
         let excess = first_excess(&beyond, limits, Some(body)).unwrap_or(excess);
         Err(TooFast::Slower { factor, excess, largest })
     } else {
@@ -67,21 +67,21 @@ pub fn largest(points: &[SetPoint], limits: &[JointLimits], body: &Body) -> f64 
             let (limits, q, dq) = (&limits[joint], now.q_d[joint], now.dq_d[joint]);
             let jerk = RATE * RATE * (after.dq_d[joint] - 2.0 * dq + before.dq_d[joint]);
             let [slowest, fastest] = limits.speed_bounds(q);
-            let speed = SHARE * if dq < 0.0 { -slowest } else { fastest };
-            let most = SHARE * limits.torque;
+            let speed = LIMITS_SHARE * if dq < 0.0 { -slowest } else { fastest };
+            let most = LIMITS_SHARE * limits.torque;
             let (still, more) = (gravity[joint], torque[joint] - gravity[joint]);
             if !(limits.q_min..=limits.q_max).contains(&q) || still.abs() > most {
                 return 0.0;
             }
             let room = if more < 0.0 { most + still } else { most - still };
             ratio(speed, dq.abs())
-                .min(ratio(SHARE * limits.acceleration, ddq[joint].abs()).sqrt())
-                .min(ratio(SHARE * limits.jerk, jerk.abs()).cbrt())
+                .min(ratio(LIMITS_SHARE * limits.acceleration, ddq[joint].abs()).sqrt())
+                .min(ratio(LIMITS_SHARE * limits.jerk, jerk.abs()).cbrt())
                 .min(ratio(room, more.abs()).sqrt())
         };
         (0..limits.len().min(MAX_JOINTS)).map(of_joint).fold(f64::INFINITY, f64::min)
     };
-    MARGIN * points.windows(3).map(of_moment).fold(f64::INFINITY, f64::min)
+    PACE_MARGIN * points.windows(3).map(of_moment).fold(f64::INFINITY, f64::min)
 }
 
 /// How often `much` goes into `room`; without bound where there is nothing.

@@ -5,20 +5,20 @@ use crate::program::Next;
 use std::fmt::Write as _;
 
 /// Pixels a metre.
-const SCALE: f64 = 1400.0;
+const PIXELS_PER_METRE: f64 = 1400.0;
 /// Half the width of what is shown [m].
-const AROUND: f64 = 0.24;
+const HALF_WIDTH: f64 = 0.24;
 
 /// The picture as an SVG file: x of the base frame upwards, y to the left, as seen from behind the robot.
 pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> String {
     let stroke = &next.stroke;
     let [x0, y0] = stroke.object;
-    let at = |x: f64, y: f64| [SCALE * (AROUND - (y - y0)), SCALE * (AROUND - (x - x0))];
+    let at = |x: f64, y: f64| [PIXELS_PER_METRE * (HALF_WIDTH - (y - y0)), PIXELS_PER_METRE * (HALF_WIDTH - (x - x0))];
     let along = [stroke.heading.cos(), stroke.heading.sin()];
     let aside = [-along[1], along[0]];
     let on_line =
         |way: f64| at(x0 + along[0] * way + aside[0] * stroke.offset, y0 + along[1] * way + aside[1] * stroke.offset);
-    let width = 2.0 * AROUND * SCALE;
+    let width = 2.0 * HALF_WIDTH * PIXELS_PER_METRE;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {:.0}\" font-family=\"sans-serif\" font-size=\"15\">\
          <rect width=\"100%\" height=\"100%\" fill=\"#fbfaf7\"/>",
@@ -49,7 +49,7 @@ pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> St
         "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{:.1}\" fill=\"none\" stroke=\"#37597a\" stroke-dasharray=\"5 5\"/>",
         rest[0],
         rest[1],
-        SCALE * 0.5 * size[0].hypot(size[1])
+        PIXELS_PER_METRE * 0.5 * size[0].hypot(size[1])
     ));
     draw(format_args!(
         "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"#b4552d\" stroke-width=\"4\"/>",
@@ -65,7 +65,7 @@ pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> St
             .expect("a string takes all text");
     };
     note([before[0] - 70.0, before[1] + 26.0], "the tool comes down here");
-    note([rest[0] - 70.0, rest[1] - SCALE * 0.5 * size[0].hypot(size[1]) - 8.0], "comes to rest about here");
+    note([rest[0] - 70.0, rest[1] - PIXELS_PER_METRE * 0.5 * size[0].hypot(size[1]) - 8.0], "comes to rest about here");
     note([12.0, 22.0], "from above; the robot's base is below, its left is on the left");
     note([12.0, width + 8.0], &format!("object at x {x0:.3} m, y {y0:.3} m"));
     let words = format!(

@@ -15,11 +15,11 @@ use std::time::{Duration, Instant};
 use twin::scene::cell_bodies;
 
 /// How near is near enough [m, rad]: what a hand can do.
-const NEAR: [f64; 2] = [5e-3, 0.05];
+const PLACING_TOLERANCE: [f64; 2] = [5e-3, 0.05];
 /// How long a person has.
 pub const BY_HAND: Duration = Duration::from_secs(120);
 /// How often the person is shown what is missing.
-const SAY: Duration = Duration::from_secs(5);
+const PROMPT_INTERVAL: Duration = Duration::from_secs(5);
 /// How long an object may take to come to rest.
 pub const COMES_TO_REST: Duration = Duration::from_secs(10);
 
@@ -112,7 +112,7 @@ impl Placing<'_> {
         let mut said = Instant::now();
         loop {
             // An object in somebody's hand does not come to rest: that is what is waited for.
-            match object.resting(SAY, self.interrupt) {
+            match object.resting(PROMPT_INTERVAL, self.interrupt) {
                 Ok(None) => return Ok(None),
                 Ok(Some(standing)) if near(&standing, wanted) => {
                     return Ok(object.standing(COMES_TO_REST, self.interrupt)?);
@@ -130,7 +130,7 @@ impl Placing<'_> {
                     BY_HAND.as_secs()
                 );
             }
-            if said.elapsed() > SAY {
+            if said.elapsed() > PROMPT_INTERVAL {
                 said = Instant::now();
                 console::line(format_args!("  {}", missing(&stands, wanted)));
             }
@@ -155,7 +155,7 @@ fn missing(stands: &Standing, wanted: &Standing) -> String {
 
 fn near(stands: &Standing, wanted: &Standing) -> bool {
     let away = (stands.place[0] - wanted.place[0]).hypot(stands.place[1] - wanted.place[1]);
-    away < NEAR[0] && between(stands.yaw, wanted.yaw).abs() < NEAR[1]
+    away < PLACING_TOLERANCE[0] && between(stands.yaw, wanted.yaw).abs() < PLACING_TOLERANCE[1]
 }
 
 fn between(a: f64, b: f64) -> f64 {

@@ -5,7 +5,7 @@
 
 use super::body::Body;
 use super::excess::{Excess, Quantity};
-use super::limits::SHARE;
+use super::limits::LIMITS_SHARE;
 use super::rate::RATE;
 use super::request::Request;
 use super::shape::Shape;
@@ -17,9 +17,9 @@ use twin::arm::{JointLimits, JointState};
 /// Distance kept from the stops [rad, or m of a joint that slides].
 const STOP_MARGIN: f64 = 0.05;
 /// Smallest amplitude worth recording [rad].
-const SMALLEST: f64 = 0.01;
+const MIN_AMPLITUDE: f64 = 0.01;
 /// How much smaller each try is, where limits couple the joints.
-const SHRINK: f64 = 0.95;
+const AMPLITUDE_STEP: f64 = 0.95;
 
 /// A clip's motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,10 +75,10 @@ pub fn plan(request: &Request, limits: &[JointLimits], body: &Body) -> Result<Pl
     let mut shrink = |scale: &mut [f64], joint: usize, excess: Excess| {
         let peak = samples.peaks[joint];
         if peak > 0.0 {
-            scale[joint] *= SHRINK;
+            scale[joint] *= AMPLITUDE_STEP;
             bound_by[joint] = Some(excess.quantity);
         }
-        if peak > 0.0 && scale[joint] * peak < SMALLEST { Err(PlanError::NoRoom(excess)) } else { Ok(()) }
+        if peak > 0.0 && scale[joint] * peak < MIN_AMPLITUDE { Err(PlanError::NoRoom(excess)) } else { Ok(()) }
     };
     for joint in (0..dof).filter(|joint| samples.peaks[*joint] > 0.0) {
         while let Some(excess) = samples.joint_excess(joint, request.start[joint], scale[joint], &limits[joint]) {
@@ -127,7 +127,7 @@ fn pose_excess(state: &JointState, ddq: &Joints, floor: f64, limits: &[JointLimi
     }
     let torque = body.torque(state, ddq);
     torque.iter().zip(limits).enumerate().find_map(|(joint, (tau, limits))| {
-        let limit = SHARE * limits.torque;
+        let limit = LIMITS_SHARE * limits.torque;
         (tau.abs() > limit).then_some(Excess {
             joint: Some(joint),
             quantity: Quantity::Torque,
@@ -167,11 +167,11 @@ impl Samples {
             let [dx, dq, ddq, dddq] = shape.map(|x| scale * x);
             let q = start + dx;
             let [slowest, fastest] = limits.speed_bounds(q);
-            let speed_limit = SHARE * if dq < 0.0 { -slowest } else { fastest };
+            let speed_limit = LIMITS_SHARE * if dq < 0.0 { -slowest } else { fastest };
             let checks = [
                 (Quantity::Speed, dq.abs(), speed_limit),
-                (Quantity::Acceleration, ddq.abs(), SHARE * limits.acceleration),
-                (Quantity::Jerk, dddq.abs(), SHARE * limits.jerk),
+                (Quantity::Acceleration, ddq.abs(), LIMITS_SHARE * limits.acceleration),
+                (Quantity::Jerk, dddq.abs(), LIMITS_SHARE * limits.jerk),
             ];
             let beyond = checks.into_iter().find(|(_, value, limit)| value > limit);
             position_excess(joint, q, limits).or(beyond.map(|(quantity, value, limit)| Excess {

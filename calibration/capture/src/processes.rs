@@ -19,13 +19,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Lines of a child's stderr kept for an error message.
-const TAIL: usize = 8;
+const KEPT_STDERR_LINES: usize = 8;
 /// An answer longer than this is none: the longest diagnosis is a hundred times shorter [bytes].
 const LONGEST_ANSWER: u64 = 256 << 20;
 /// How long a child may take to end after SIGTERM before it is killed.
-const GRACE: Duration = Duration::from_secs(5);
+const EXIT_TIMEOUT: Duration = Duration::from_secs(5);
 /// How often a child is looked at while it ends.
-const LOOK: Duration = Duration::from_millis(10);
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// A child process could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -189,7 +189,7 @@ impl Running {
     /// [`ProcessError::Ended`] when it fails, [`ProcessError::Stuck`] when it has to be killed.
     pub fn stop(mut self) -> Result<String, ProcessError> {
         self.terminate();
-        self.finish(GRACE, || false)
+        self.finish(EXIT_TIMEOUT, || false)
     }
 
     /// Waits until the child ends by itself and returns what it wrote to stdout. Asked to give up by `cancelled`, it ends the child first.
@@ -211,10 +211,10 @@ impl Running {
                 self.kill();
                 return Err(ProcessError::Stuck { name: self.name.clone(), waited: patience, words: self.words() });
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         };
         // Not for ever: another process may have inherited the pipe and hold it open.
-        let answer = self.answer.take().and_then(|answer| answer.recv_timeout(GRACE).ok()).unwrap_or_default();
+        let answer = self.answer.take().and_then(|answer| answer.recv_timeout(EXIT_TIMEOUT).ok()).unwrap_or_default();
         if status.success() { Ok(answer) } else { Err(self.ended(status, answer)) }
     }
 
@@ -244,7 +244,7 @@ impl Running {
 
     fn ended(&self, status: ExitStatus, answer: String) -> ProcessError {
         // The reader of stderr may be a moment behind the end of the process.
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
         ProcessError::Ended { name: self.name.clone(), status, words: self.words(), answer }
     }
 
@@ -263,11 +263,11 @@ impl Drop for Running {
         self.terminate();
         let start = Instant::now();
         while self.poll().is_none() {
-            if start.elapsed() > GRACE {
+            if start.elapsed() > EXIT_TIMEOUT {
                 self.kill();
                 return;
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
     }
 }
@@ -275,7 +275,7 @@ impl Drop for Running {
 fn keep_tail(stderr: impl Read, tail: &Mutex<VecDeque<String>>) {
     child_output::lines(stderr, |line| {
         let mut kept = tail.lock().unwrap_or_else(PoisonError::into_inner);
-        if kept.len() == TAIL {
+        if kept.len() == KEPT_STDERR_LINES {
             kept.pop_front();
         }
         kept.push_back(line.to_owned());
@@ -295,20 +295,21 @@ mod tests {
     /// Returns once the child has said something on stderr.
     fn said(child: &Running) {
         while child.words().is_empty() {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
     }
 
     #[test]
     fn the_last_words_of_a_child_that_fails_are_quoted() {
-        let error = shell("echo cannot open the robot >&2; exit 1").finish(GRACE, || false).unwrap_err().to_string();
+        let error =
+            shell("echo cannot open the robot >&2; exit 1").finish(EXIT_TIMEOUT, || false).unwrap_err().to_string();
         assert!(error.contains("exit status: 1") && error.contains("cannot open the robot"), "{error}");
     }
 
     #[test]
     fn a_child_that_fails_leaves_its_answer_and_its_trouble_in_a_line() {
         let script = "echo kept; echo '12:00 INFO all is well' >&2; echo 'error: no room' >&2; echo '12:01  INFO bye' >&2; exit 1";
-        let ended = shell(script).finish(GRACE, || false).unwrap_err();
+        let ended = shell(script).finish(EXIT_TIMEOUT, || false).unwrap_err();
         assert!(ended.to_string().ends_with(": no room"), "{ended}");
         assert!(matches!(ended, ProcessError::Ended { answer, .. } if answer == "kept\n"));
     }
@@ -316,7 +317,7 @@ mod tests {
     #[test]
     fn of_a_child_with_wrong_arguments_the_error_is_quoted_and_not_the_way_to_help() {
         let script = "printf 'error: no such arm\n\nFor more information, try --help.\n' >&2; exit 2";
-        let ended = shell(script).finish(GRACE, || false).unwrap_err().to_string();
+        let ended = shell(script).finish(EXIT_TIMEOUT, || false).unwrap_err().to_string();
         assert!(ended.ends_with(": no such arm"), "{ended}");
     }
 
@@ -325,7 +326,7 @@ mod tests {
         let mut child = shell("exit 0");
         let ended = loop {
             match child.check() {
-                Ok(()) => std::thread::sleep(LOOK),
+                Ok(()) => std::thread::sleep(POLL_INTERVAL),
                 Err(ended) => break ended,
             }
         };
@@ -350,15 +351,15 @@ mod tests {
         let mut child = shell("sleep 600 & echo ready >&2; wait");
         said(&child);
         let answer = child.answer.take().expect("a pipe");
-        assert!(matches!(child.finish(GRACE, || true), Err(ProcessError::Ended { .. })));
-        assert!(answer.recv_timeout(GRACE).is_ok(), "a process it started still holds its stdout");
+        assert!(matches!(child.finish(EXIT_TIMEOUT, || true), Err(ProcessError::Ended { .. })));
+        assert!(answer.recv_timeout(EXIT_TIMEOUT).is_ok(), "a process it started still holds its stdout");
     }
 
     #[test]
     fn a_process_that_left_the_group_of_an_ended_child_is_not_waited_for() {
         let child = shell("setsid sleep 90 & exit 0");
         let start = Instant::now();
-        assert_eq!(child.finish(2 * GRACE, || false).expect("a clean end"), "");
-        assert!(start.elapsed() < 10 * GRACE, "waited for the process that holds the pipe");
+        assert_eq!(child.finish(2 * EXIT_TIMEOUT, || false).expect("a clean end"), "");
+        assert!(start.elapsed() < 10 * EXIT_TIMEOUT, "waited for the process that holds the pipe");
     }
 }

@@ -22,20 +22,20 @@ const GOLDEN: f64 = 1.167_303_978_261_418_7;
 /// Speeds of the hit [m/s].
 pub const SPEEDS: [f64; 2] = [0.22, 0.6];
 /// How far a line passes beside the centre, as a share of half the narrower side.
-const ASIDE: f64 = 0.55;
+const MAX_OFFSET_SHARE: f64 = 0.55;
 /// Heights of the tool's end as a share of the object's.
 const HEIGHTS: [f64; 2] = [0.2, 0.5];
 /// How far from a face's normal a stroke may come [rad]: further round it would slip off the edge.
-const OBLIQUE: f64 = 0.35;
+const MAX_OBLIQUITY: f64 = 0.35;
 /// Middle of the area that an arm of this class reaches from all sides, and its radius [m].
 pub const MIDDLE: [f64; 2] = [0.48, 0.0];
 const RADIUS: f64 = 0.13;
 /// Other directions that are tried when the wanted one leads out of the area [rad].
-const TURN: f64 = PI / 9.0;
+const TURN_STEP: f64 = PI / 9.0;
 /// Shares of the wanted speed that are tried, where no direction allows more.
 pub const PACES: [f64; 3] = [1.0, 0.8, 0.6];
 /// The object slides further than reckoned by this much at most.
-const SLIDES: f64 = 1.3;
+const SLIDE_RATIO: f64 = 1.3;
 /// Rest before a stroke and after it [s].
 pub const RESTS: [f64; 2] = [0.3, 0.8];
 
@@ -179,7 +179,7 @@ impl<'a> Program<'a> {
         let paces = if self.pace == 1.0 { &PACES[..] } else { &PACES[..1] };
         let tries = paces.iter().flat_map(|pace| turns.clone().map(move |turn| (*pace, turn)));
         for (pace, turn) in tries {
-            let (heading, speed) = (wish.heading + turn * TURN, pace * wish.speed);
+            let (heading, speed) = (wish.heading + turn * TURN_STEP, pace * wish.speed);
             let stroke = self.stroke(&Wish { heading, speed, ..*wish }, object);
             let rest = self.rest(&stroke);
             let away = |place: [f64; 2]| (place[0] - MIDDLE[0]).hypot(place[1] - MIDDLE[1]);
@@ -247,13 +247,13 @@ impl<'a> Program<'a> {
         let from_face = wish.heading - object.yaw;
         let face = (from_face / FRAC_PI_2).round();
         let oblique = from_face - face * FRAC_PI_2;
-        let heading = object.yaw + face * FRAC_PI_2 + oblique * OBLIQUE / (0.5 * FRAC_PI_2);
+        let heading = object.yaw + face * FRAC_PI_2 + oblique * MAX_OBLIQUITY / (0.5 * FRAC_PI_2);
         let height = HEIGHTS[0] + (HEIGHTS[1] - HEIGHTS[0]) * wish.height;
         Stroke {
             object: object.place,
             clearance: 0.5 * x.hypot(y) + self.tool,
             heading: heading.sin().atan2(heading.cos()),
-            offset: 0.5 * ASIDE * wish.aside * x.min(y),
+            offset: 0.5 * MAX_OFFSET_SHARE * wish.aside * x.min(y),
             speed: self.pace * wish.speed,
             height: self.table + (height * z).max(1.5 * self.tool),
             // Faster or slower, the way stays the same.
@@ -278,7 +278,7 @@ impl<'a> Program<'a> {
 
     /// A free slide at the speed of the hit [m].
     fn slide(&self, stroke: &Stroke) -> f64 {
-        SLIDES * stroke.speed * stroke.speed / (2.0 * self.friction * GRAVITY)
+        SLIDE_RATIO * stroke.speed * stroke.speed / (2.0 * self.friction * GRAVITY)
     }
 
     fn after(stroke: &Stroke, way: f64) -> [f64; 2] {

@@ -14,11 +14,11 @@ const SPEED_BEYOND: f64 = 3.0;
 const SPEED_MORE: f64 = 0.5;
 /// An arm that is farther from its command while it plays a clip does not follow it [rad, or m of a joint that slides]: hobby servos under a
 /// load hang by a tenth, and two of them are 20 cm at the end of a metre. A choice.
-const FAR: f64 = 0.2;
+const MAX_TRACKING_ERROR: f64 = 0.2;
 /// An arm that is farther from its command at rest does not hold it [rad]. A choice.
-pub(super) const LOOSE: f64 = 0.5;
+pub(super) const MAX_REST_ERROR: f64 = 0.5;
 /// An arm that turns faster does not hold still [rad/s]: the noise of a velocity stays below. A choice.
-pub(super) const FAST: f64 = 3.0;
+pub(super) const MAX_REST_SPEED: f64 = 3.0;
 
 /// What a person does about an arm that does not follow.
 pub(super) const GAINS: &str = "look at `stiffness` and `damping` of `[controller]` in cell.toml, which have to hold this arm (a light link \
@@ -95,9 +95,9 @@ impl Quality {
                 "the arm reached {seen:.2} rad/s where {planned_speed:.2} were planned: it does not do as it is commanded; {GAINS}"
             ));
         }
-        if let Some(error) = self.tracking_error.filter(|error| *error > FAR) {
+        if let Some(error) = self.tracking_error.filter(|error| *error > MAX_TRACKING_ERROR) {
             return Verdict::Repeat(format!(
-                "the arm was {error:.2} rad away from its command, more than {FAR} rad: it does not follow; {GAINS}"
+                "the arm was {error:.2} rad away from its command, more than {MAX_TRACKING_ERROR} rad: it does not follow; {GAINS}"
             ));
         }
         Verdict::Keep

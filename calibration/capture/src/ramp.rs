@@ -8,21 +8,21 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// Most levels of speed, evenly spaced in their logarithm: four to a power of ten over two powers.
-const LEVELS: usize = 9;
+const MAX_LEVELS: usize = 9;
 /// A level takes about so long where the whole allows it [s].
-const LEVEL: f64 = 4.0;
+const LEVEL_TIME: f64 = 4.0;
 /// Shortest duration that holds a few levels [s].
-pub const SHORTEST: f64 = 12.0;
+pub const MIN_DURATION: f64 = 12.0;
 /// Rest between levels, so that each begins by breaking loose [s].
-const REST: f64 = 0.2;
+const REST_TIME: f64 = 0.2;
 /// A reversal takes this long [s], or as long as it has to at ...
-const REVERSAL: f64 = 0.3;
+const MIN_REVERSAL_TIME: f64 = 0.3;
 /// ... this acceleration [rad/s²].
-const ACCELERATION: f64 = 6.0;
+const REVERSAL_ACCELERATION: f64 = 6.0;
 /// Peak slope of the quintic.
-const PEAK: f64 = 1.875;
+const QUINTIC_PEAK_SPEED: f64 = 1.875;
 /// How much further a reversal leads, as a share of speed times its duration: `1/2 - 2 swept(1/2)`.
-const OVERSHOOT: f64 = 0.343_75;
+const REVERSAL_OVERSHOOT: f64 = 0.343_75;
 
 /// Triangles of one speed after the other.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,15 +48,15 @@ impl Ramp {
     pub fn draw(speeds: [f64; 2], amplitude: f64, duration: f64, dof: usize, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let directions = (0..dof).map(|_| if rng.random_bool(0.5) { 1.0 } else { -1.0 }).collect();
-        let levels = ((duration / LEVEL) as usize).clamp(3, LEVELS);
-        let each = duration / levels as f64 - REST;
+        let levels = ((duration / LEVEL_TIME) as usize).clamp(3, MAX_LEVELS);
+        let each = duration / levels as f64 - REST_TIME;
         let mut course = Course::default();
-        course.turn(0.0, REST);
+        course.turn(0.0, REST_TIME);
         for level in 0..levels {
             let share = level as f64 / (levels - 1) as f64;
             let speed = speeds[0] * (speeds[1] / speeds[0]).powf(share);
             course.triangles(speed.min(fastest(amplitude)), amplitude, each);
-            course.turn(0.0, REST);
+            course.turn(0.0, REST_TIME);
         }
         Self { duration: course.time, pieces: course.pieces, directions }
     }
@@ -75,13 +75,13 @@ impl Ramp {
 
 /// How long a reversal at this speed takes [s].
 fn reversal(speed: f64) -> f64 {
-    REVERSAL.max(2.0 * PEAK * speed / ACCELERATION)
+    MIN_REVERSAL_TIME.max(2.0 * QUINTIC_PEAK_SPEED * speed / REVERSAL_ACCELERATION)
 }
 
 /// The highest speed that a triangle of so small an amplitude reaches before it has to turn: a little cruise is left [rad/s].
 fn fastest(amplitude: f64) -> f64 {
-    let at_shortest = amplitude / REVERSAL;
-    let accelerated = (amplitude * ACCELERATION / (2.0 * PEAK)).sqrt();
+    let at_shortest = amplitude / MIN_REVERSAL_TIME;
+    let accelerated = (amplitude * REVERSAL_ACCELERATION / (2.0 * QUINTIC_PEAK_SPEED)).sqrt();
     at_shortest.min(accelerated)
 }
 
@@ -129,7 +129,7 @@ impl Course {
         let bend = reversal(speed);
         let reach = amplitude.min(speed * (0.25 * time).max(bend));
         let count = (time * speed / (4.0 * reach)) as usize;
-        let edge = reach - OVERSHOOT * speed * bend;
+        let edge = reach - REVERSAL_OVERSHOOT * speed * bend;
         self.turn(speed, bend);
         for _ in 0..count.max(1) {
             self.cruise(edge);

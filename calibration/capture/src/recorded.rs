@@ -15,13 +15,13 @@ use shared_mem::typed::Command;
 use std::path::{Path, PathBuf};
 
 /// What moves less is at rest [rad/s].
-const STILL: f64 = 1e-7;
+const MAX_STILL_SPEED: f64 = 1e-7;
 /// Rows further apart than this leave open what was between them [cycles].
-const FURTHEST: f64 = 25.0;
+const MAX_ROW_GAP: f64 = 25.0;
 /// A row counts as of a cycle when it is so near [cycles].
-const NEAR: f64 = 0.2;
+const MAX_CYCLE_OFFSET: f64 = 0.2;
 /// Poses that say where the object stood before the motion.
-const POSES: usize = 20;
+const AVERAGED_POSES: usize = 20;
 
 /// A clip cannot be played again.
 #[derive(Debug, thiserror::Error)]
@@ -131,7 +131,7 @@ pub fn motion(desired: &JointSeries) -> Result<Vec<SetPoint>, &'static str> {
         Ok(SetPoint { q_d: joints_from(desired.q_row(i)), dq_d: joints_from(dq) })
     };
     let rows = (0..count).map(row).collect::<Result<Vec<SetPoint>, &'static str>>()?;
-    let moves = |point: &SetPoint| point.dq_d.iter().any(|dq| dq.abs() > STILL);
+    let moves = |point: &SetPoint| point.dq_d.iter().any(|dq| dq.abs() > MAX_STILL_SPEED);
     let (Some(first), Some(last)) = (rows.iter().position(moves), rows.iter().rposition(moves)) else {
         return Err("nothing moves in it");
     };
@@ -139,7 +139,7 @@ pub fn motion(desired: &JointSeries) -> Result<Vec<SetPoint>, &'static str> {
         return Err("it does not begin and end at rest");
     }
     let times: Vec<f64> = (first - 1..=last + 1).map(|i| cycle(desired, first - 1, i)).collect();
-    if times.windows(2).any(|w| w[1] - w[0] > FURTHEST || w[1] <= w[0]) {
+    if times.windows(2).any(|w| w[1] - w[0] > MAX_ROW_GAP || w[1] <= w[0]) {
         return Err("too many of its rows are missing");
     }
     let mut points = resampled(&times, &rows[first - 1..=last + 1], 1.0);
@@ -153,12 +153,12 @@ pub fn motion(desired: &JointSeries) -> Result<Vec<SetPoint>, &'static str> {
 /// When a row was, from the row `first` on [cycles]: a whole number where the rows follow the control rate.
 fn cycle(desired: &JointSeries, first: usize, row: usize) -> f64 {
     let cycles = (desired.stamps_ns[row] - desired.stamps_ns[first]) as f64 * 1e-9 * RATE;
-    if (cycles - cycles.round()).abs() < NEAR { cycles.round() } else { cycles }
+    if (cycles - cycles.round()).abs() < MAX_CYCLE_OFFSET { cycles.round() } else { cycles }
 }
 
 /// Where a clip's object stood at its beginning.
 fn standing(clip: &Clip) -> Option<Standing> {
-    let poses = &clip.object.poses[..clip.object.len().min(POSES)];
+    let poses = &clip.object.poses[..clip.object.len().min(AVERAGED_POSES)];
     let (count, first) = (poses.len() as f64, poses.first()?);
     let yaw = |pose: &shared_mem::frames::Pose<shared_mem::frames::Base, shared_mem::frames::Object>| {
         let (_, _, yaw) = pose.isometry().rotation.euler_angles();

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// How long the recorder may take until its file is there.
-const START: Duration = Duration::from_secs(10);
+const START_TIMEOUT: Duration = Duration::from_secs(10);
 /// Still time recorded before and after a motion, so that a fit sees where the arm came from and how it settles.
-const MARGIN: Duration = Duration::from_millis(300);
+const STILL_TIME: Duration = Duration::from_millis(300);
 
 /// A clip could not be recorded.
 #[derive(Debug, thiserror::Error)]
@@ -18,7 +18,7 @@ pub enum RecordError {
     #[error("{0}; to go on, start the same command again: the session is continued")]
     Process(#[from] ProcessError),
     /// The recorder runs but writes nothing.
-    #[error("the recorder did not open {} within {} s; check that the disk has room", file.display(), START.as_secs())]
+    #[error("the recorder did not open {} within {} s; check that the disk has room", file.display(), START_TIMEOUT.as_secs())]
     NoFile { file: PathBuf },
     /// Its answer is not what was agreed.
     #[error(
@@ -59,12 +59,12 @@ impl Recorder {
         let start = Instant::now();
         while !clip.exists() && !interrupt.asked() {
             running.check()?;
-            if start.elapsed() > START {
+            if start.elapsed() > START_TIMEOUT {
                 return Err(RecordError::NoFile { file: clip.to_owned() });
             }
             std::thread::sleep(Duration::from_millis(10));
         }
-        std::thread::sleep(MARGIN);
+        std::thread::sleep(STILL_TIME);
         Ok(Self { running })
     }
 
@@ -74,7 +74,7 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`] when the recorder failed or its answer cannot be read.
     pub fn finish(self) -> Result<Recorded, RecordError> {
-        std::thread::sleep(MARGIN);
+        std::thread::sleep(STILL_TIME);
         understood(self.running.stop())
     }
 }

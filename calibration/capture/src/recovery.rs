@@ -8,9 +8,9 @@ use shared_mem::console;
 use std::time::{Duration, Instant};
 
 /// Wait before a reflex is cleared: an object comes to rest, a person sees what happened and can end it.
-const PAUSE: Duration = Duration::from_secs(2);
+const RECOVERY_PAUSE: Duration = Duration::from_secs(2);
 /// How often the wait looks whether to end.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// The robot will not be recovered by this run.
 #[derive(Debug, thiserror::Error)]
@@ -73,14 +73,14 @@ impl Recovery {
             return Err(RecoveryError::TooOften { reason, most: self.most });
         }
         self.done += 1;
-        let wait = PAUSE.as_secs();
+        let wait = RECOVERY_PAUSE.as_secs();
         console::line(format_args!(
             "{reason}; it is recovered in {wait} s ({} of {} times, Ctrl-C ends)",
             self.done, self.most
         ));
         let begin = Instant::now();
-        while begin.elapsed() < PAUSE && !interrupt.asked() {
-            std::thread::sleep(LOOK);
+        while begin.elapsed() < RECOVERY_PAUSE && !interrupt.asked() {
+            std::thread::sleep(POLL_INTERVAL);
         }
         interrupt.wait_out_pause();
         if interrupt.asked() {

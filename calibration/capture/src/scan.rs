@@ -79,11 +79,11 @@ pub struct Summary {
 }
 
 /// Fewer views make no scan.
-const FEWEST: usize = 8;
+const MIN_VIEWS: usize = 8;
 /// Flange, tool and camera stay this far above the table [m].
 const CLEARANCE: f64 = 0.05;
 /// From the middle of a pixel to the corner that lists of pictures count from.
-const HALF: f64 = 0.5;
+const PIXEL_CORNER_OFFSET: f64 = 0.5;
 
 /// Everything that stays the same from view to view.
 struct CaptureContext<'a> {
@@ -154,7 +154,8 @@ fn list(cell: &Cell, hand_eye: &HandEye) -> anyhow::Result<(Value, Intrinsics)> 
             json!({ "k1": k1, "k2": k2, "p1": p1, "p2": p2, "k3": k3, "k4": k4, "k5": k5, "k6": k6 })
         }
     };
-    let mut list = json!({ "fl_x": fx, "fl_y": fy, "cx": cx + HALF, "cy": cy + HALF, "frames": [] });
+    let mut list =
+        json!({ "fl_x": fx, "fl_y": fy, "cx": cx + PIXEL_CORNER_OFFSET, "cy": cy + PIXEL_CORNER_OFFSET, "frames": [] });
     if let (Value::Object(list), Value::Object(lens)) = (&mut list, lens) {
         list.extend(lens);
     }
@@ -309,7 +310,7 @@ fn check(at: &Point3<f64>, free: &[Joints], blocked: &[Blocked]) -> anyhow::Resu
     let all = free.len() + blocked.len();
     let place = format!("{}, {}, {} m", at.x, at.y, at.z);
     ensure!(
-        all >= FEWEST,
+        all >= MIN_VIEWS,
         "of the views around {place} only {all} are within the arm's reach: move the object nearer, or give another --distance"
     );
     let mut said: Vec<&str> = Vec::new();
@@ -323,11 +324,11 @@ fn check(at: &Point3<f64>, free: &[Joints], blocked: &[Blocked]) -> anyhow::Resu
             console::line(format_args!("{} of {all} views are left out: {worst}", of_this().count()));
         }
     }
-    let worst = blocked.iter().cloned().reduce(obstacle::worse).filter(|_| free.len() < FEWEST);
+    let worst = blocked.iter().cloned().reduce(obstacle::worse).filter(|_| free.len() < MIN_VIEWS);
     let left = free.len();
     worst.map_or(Ok(()), |worst| {
         Err(anyhow::anyhow!(
-            "of the views around {place} only {left} are clear of other objects, and {FEWEST} are needed: {worst}"
+            "of the views around {place} only {left} are clear of other objects, and {MIN_VIEWS} are needed: {worst}"
         ))
     })
 }

@@ -10,15 +10,15 @@ use shared_mem::transport::{ImageSample, ImageSubscriber, Node, TransportError};
 use std::time::{Duration, Instant};
 
 /// Joints slower than this stand still [rad/s].
-const STILL: f64 = 5e-3;
+const MAX_STILL_SPEED: f64 = 5e-3;
 /// They have done so for so long: what swings has come to rest.
-const REST: Duration = Duration::from_millis(400);
+const REST_TIME: Duration = Duration::from_millis(400);
 /// How long that, or a picture, is waited for.
-const PATIENCE: Duration = Duration::from_secs(10);
+const PICTURE_TIMEOUT: Duration = Duration::from_secs(10);
 /// How much later than the colour of a moment its depth may arrive.
-const DEPTH: Duration = Duration::from_millis(300);
+const MAX_DEPTH_DELAY: Duration = Duration::from_millis(300);
 /// Between two looks.
-const LOOK: Duration = Duration::from_millis(2);
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 /// No picture could be had.
 #[derive(Debug, thiserror::Error)]
@@ -33,7 +33,7 @@ pub enum ShotError {
     )]
     NoPictures,
     /// The arm does not come to rest.
-    #[error("the arm does not come to rest within {} s; look at its gains, then start again", PATIENCE.as_secs())]
+    #[error("the arm does not come to rest within {} s; look at its gains, then start again", PICTURE_TIMEOUT.as_secs())]
     Restless,
     /// The user ended it.
     #[error("interrupted")]
@@ -98,16 +98,16 @@ impl Shots {
             if interrupt.asked() {
                 return Err(ShotError::Interrupted);
             }
-            if began.elapsed() > PATIENCE {
+            if began.elapsed() > PICTURE_TIMEOUT {
                 return Err(ShotError::NoPictures);
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         };
         let (sequence, began) = (colour.header.sequence, Instant::now());
         let mut depth = None;
-        while depth.is_none() && began.elapsed() < DEPTH {
+        while depth.is_none() && began.elapsed() < MAX_DEPTH_DELAY {
             depth = newer(&self.depth, |header| header.sequence == sequence)?;
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
         Ok(Shot { state, colour, depth })
     }
@@ -135,18 +135,18 @@ fn packed(sample: &ImageSample) -> Pixels {
 fn rest(link: &mut Link, interrupt: &Interrupt) -> Result<ArmState, ShotError> {
     let began = Instant::now();
     let mut since: Option<Instant> = None;
-    while began.elapsed() < PATIENCE {
+    while began.elapsed() < PICTURE_TIMEOUT {
         if interrupt.asked() {
             return Err(ShotError::Interrupted);
         }
         let Some(state) = link.next_state()? else {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
             continue;
         };
         let fastest = state.dq.iter().take(state.dof as usize).fold(0.0_f64, |most, dq| most.max(dq.abs()));
-        if fastest > STILL {
+        if fastest > MAX_STILL_SPEED {
             since = None;
-        } else if since.get_or_insert_with(Instant::now).elapsed() > REST {
+        } else if since.get_or_insert_with(Instant::now).elapsed() > REST_TIME {
             return Ok(state);
         }
     }

@@ -18,9 +18,9 @@ use shared_mem::msg::{Joints, MAX_JOINTS};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Speed of the hit where nothing else is asked for [m/s]: the middle of what a session's strokes have.
-const SPEED: f64 = 0.5 * (SPEEDS[0] + SPEEDS[1]);
+const DEFAULT_SPEED: f64 = 0.5 * (SPEEDS[0] + SPEEDS[1]);
 /// Height of the tool's end, from the lowest (0) to the highest (1).
-const HEIGHT: f64 = 0.4;
+const TIP_HEIGHT_SHARE: f64 = 0.4;
 
 /// A stroke and where the object has to stand for it.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,7 +118,8 @@ fn straight(
     let paces = if program.pace == 1.0 { &PACES[..] } else { &PACES[..1] };
     let mut first = None;
     for pace in paces {
-        let stroke = program.stroke(&Wish { heading, speed: pace * SPEED, aside: 0.0, height: HEIGHT }, standing);
+        let stroke = program
+            .stroke(&Wish { heading, speed: pace * DEFAULT_SPEED, aside: 0.0, height: TIP_HEIGHT_SHARE }, standing);
         match program.whole(&stroke, ways, program.body.model().ready()) {
             Ok((plan, _)) => return Ok((stroke, plan)),
             Err(error) => first = first.or(Some(error)),
@@ -165,7 +166,7 @@ fn geometry(program: &Program<'_>, points: &[SetPoint], standing: &Standing) -> 
     let way = last - first;
     let heading = way.y.atan2(way.x);
     let speed = points.windows(2).map(|w| (tip(&w[1]) - tip(&w[0])).norm() * RATE).fold(0.0, f64::max);
-    let wish = Wish { heading, speed: speed / program.pace, aside: 0.0, height: HEIGHT };
+    let wish = Wish { heading, speed: speed / program.pace, aside: 0.0, height: TIP_HEIGHT_SHARE };
     let beside = [first.x - standing.place[0], first.y - standing.place[1]];
     let offset = beside[1] * heading.cos() - beside[0] * heading.sin();
     Stroke { heading, offset, height: first.z, ..program.stroke(&wish, standing) }

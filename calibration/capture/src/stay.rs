@@ -9,9 +9,9 @@ use std::f64::consts::TAU;
 use twin::scene::{CellBody, joint_position, start_of, starts};
 
 /// Nearer than this to where it was started, an object has not moved, and what differs is the tracker's noise [m or rad].
-const SAME: [f64; 2] = [2e-3, 0.01];
+const MAX_TRACKER_NOISE: [f64; 2] = [2e-3, 0.01];
 /// What leans further is not upright [rad].
-const LEANS: f64 = 0.1;
+const MAX_LEAN: f64 = 0.1;
 
 /// Has the objects of `cell` beside the one in question start where `seen` has their bodies; `bodies`: all of the cell. An object that
 /// did not move keeps its start. Returns the names of those that lie on a side, which start upright.
@@ -23,12 +23,13 @@ pub(super) fn stay(cell: &mut Cell, bodies: &[CellBody], seen: &[(ObjectName, Is
     for (number, (object, begun)) in cell.objects.iter_mut().zip(&begun).enumerate() {
         let own: Vec<&CellBody> = bodies.iter().filter(|body| body.object == number).collect();
         let Some(stands) = own.first().and_then(|root| pose(root)).filter(|_| number != in_question) else { continue };
-        if (stands * Vector3::z()).angle(&Vector3::z()) > LEANS {
+        if (stands * Vector3::z()).angle(&Vector3::z()) > MAX_LEAN {
             on_a_side.extend(object.name.clone());
         }
         let [yaw, before] = [&stands, begun].map(|pose| pose.rotation.euler_angles().2);
         let [there, was] = [stands, *begun].map(|pose| pose.translation.vector.xy());
-        let has_moved = (there - was).norm() > SAME[0] || between(yaw, before).abs() > SAME[1];
+        let has_moved =
+            (there - was).norm() > MAX_TRACKER_NOISE[0] || between(yaw, before).abs() > MAX_TRACKER_NOISE[1];
         // A start that is not said depends on that of the object before it.
         let (place, yaw) = if has_moved { (there, yaw) } else { (was, before) };
         (object.start, object.start_yaw) = (Some(place.into()), Some(yaw));
@@ -54,7 +55,7 @@ fn moved(
     let turns = if joint.slides { [0.0; 3] } else { [0.0, TAU, -TAU] };
     let inside = turns.iter().map(|turn| position + turn).find(|position| (low..=high).contains(position));
     let position = inside.unwrap_or_else(|| position.clamp(low, high));
-    let same = SAME[usize::from(!joint.slides)];
+    let same = MAX_TRACKER_NOISE[usize::from(!joint.slides)];
     ((position - start_of(object, link)).abs() > same).then(|| (joint.name.clone(), position))
 }
 

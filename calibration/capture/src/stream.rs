@@ -10,15 +10,15 @@ use shared_mem::time::now_ns;
 use std::time::{Duration, Instant};
 
 /// Set points kept waiting at the bridge: 0.4 s at 1 kHz, longer than this process is ever kept from running.
-const AHEAD: usize = 400;
+const QUEUED_SET_POINTS: usize = 400;
 /// Pause between looks at the arm.
-const LOOK: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// A bridge that has not begun to play by then never will.
 const TAKE_UP: Duration = Duration::from_secs(2);
 /// How long an arm may take to come to rest after a stop.
-const BRAKING: Duration = Duration::from_secs(3);
+const BRAKING_TIMEOUT: Duration = Duration::from_secs(3);
 /// After a stop the bridge begins nothing before a silence, which it counts in its own cycles: half as long again.
-const SILENCE: Duration = Duration::from_nanos(STOP_SILENCE_NS + STOP_SILENCE_NS / 2);
+const SILENCE_AFTER_STOP: Duration = Duration::from_nanos(STOP_SILENCE_NS + STOP_SILENCE_NS / 2);
 
 /// How a motion ended that was not refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,7 +113,7 @@ impl<'a> Feeder<'a> {
         }
         let played = if ours { state.motion_played as usize } else { 0 };
         let waiting = self.sent.saturating_sub(played);
-        if self.sent < self.motion.set_points.len() && waiting + CHUNK_LENGTH <= AHEAD {
+        if self.sent < self.motion.set_points.len() && waiting + CHUNK_LENGTH <= QUEUED_SET_POINTS {
             Step::Send
         } else {
             Step::Wait
@@ -178,12 +178,12 @@ pub fn play(
             stopped = Some((halted(), Instant::now()));
         }
         if let Some((outcome, since)) = stopped {
-            let rests = at_rest(&state, &feeder) || since.elapsed() > BRAKING;
+            let rests = at_rest(&state, &feeder) || since.elapsed() > BRAKING_TIMEOUT;
             if rests && interrupt.asked() {
                 return Ok(Outcome::Stopped);
             }
             // What comes after a pause has to be begun by the bridge.
-            if rests && since.elapsed() > SILENCE {
+            if rests && since.elapsed() > SILENCE_AFTER_STOP {
                 return Ok(outcome);
             }
         } else {
@@ -205,7 +205,7 @@ pub fn play(
                 return Err(StreamError::NotTaken);
             }
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 

@@ -16,7 +16,7 @@ use shared_mem::msg::motion::SetPoint;
 use twin::arm::JointLimits;
 
 /// Way at full speed before the object's bounding circle, so that the controller has settled when it hits [m].
-const SETTLED: f64 = 0.02;
+const SETTLING_DISTANCE: f64 = 0.02;
 
 /// What is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,7 +106,7 @@ struct Profile {
 impl Profile {
     fn of(stroke: &Stroke) -> Self {
         let Stroke { speed, rise, rest, .. } = *stroke;
-        let before = stroke.clearance + SETTLED;
+        let before = stroke.clearance + SETTLING_DISTANCE;
         // Over the rise the mean speed is half of the final one.
         let cruise = (before + stroke.follow_through) / speed;
         Self { speed, rise, cruise, rest, to_middle: 0.5 * speed * rise + before }

@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 
 /// An object that moved less was not hit [m].
-const MOVED: f64 = 5e-3;
+const MIN_OBJECT_MOTION: f64 = 5e-3;
 /// Share of lost poses from which a stroke is better repeated.
 const POSES_LOST: f64 = 0.1;
 
@@ -44,7 +44,7 @@ pub struct ClipSummary {
 /// Why the object's poses make a clip useless, if they do.
 pub(super) fn unfit(seen: &PoseQuality, pushed: &[(String, f64, f64)]) -> Option<String> {
     let lost = seen.lost_poses as f64 / (seen.poses + seen.lost_poses).max(1) as f64;
-    if seen.moved < MOVED {
+    if seen.moved < MIN_OBJECT_MOTION {
         return Some(format!("the object moved by {:.1} mm only: it was not hit", 1e3 * seen.moved));
     }
     if let Some((name, far, turned)) = pushed.first() {

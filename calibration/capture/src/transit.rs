@@ -10,11 +10,11 @@ use shared_mem::msg::{Joints, MAX_JOINTS};
 use twin::arm::JointLimits;
 
 /// Share of the limits of acceleration and jerk that a transit uses.
-const CALM: f64 = 0.4;
+const LIMITS_SHARE: f64 = 0.4;
 /// Nobody is surprised by an arm this slow [rad/s].
-const SPEED: f64 = 0.8;
+const MAX_SPEED: f64 = 0.8;
 /// What a joint that is not there may do, so that the planner has numbers.
-const IDLE: f64 = 1.0;
+const ABSENT_JOINT_LIMIT: f64 = 1.0;
 
 /// Set points of the way, the first in `from` and the last in `to`, one a control cycle, at a share `pace` of the usual
 /// speed; `None` where no way is found.
@@ -25,9 +25,10 @@ pub fn plan(from: &Joints, to: &Joints, limits: &[JointLimits], pace: f64) -> Op
         let limit = limits.get(joint);
         input.current_position[joint] = from[joint];
         input.target_position[joint] = if limit.is_some() { to[joint] } else { from[joint] };
-        input.max_velocity[joint] = pace * limit.map_or(IDLE, |limit| SPEED.min(CALM * limit.velocity));
-        input.max_acceleration[joint] = CALM * limit.map_or(IDLE, |limit| limit.acceleration);
-        input.max_jerk[joint] = CALM * limit.map_or(IDLE, |limit| limit.jerk);
+        input.max_velocity[joint] =
+            pace * limit.map_or(ABSENT_JOINT_LIMIT, |limit| MAX_SPEED.min(LIMITS_SHARE * limit.velocity));
+        input.max_acceleration[joint] = LIMITS_SHARE * limit.map_or(ABSENT_JOINT_LIMIT, |limit| limit.acceleration);
+        input.max_jerk[joint] = LIMITS_SHARE * limit.map_or(ABSENT_JOINT_LIMIT, |limit| limit.jerk);
     }
     let mut planner = Ruckig::<MAX_JOINTS, IgnoreErrorHandler>::new(None, RATE.recip());
     let mut plan = Trajectory::new(None);

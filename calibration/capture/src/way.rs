@@ -16,11 +16,11 @@ use shared_mem::msg::motion::SetPoint;
 use twin::arm::JointLimits;
 
 /// Speed straight up and down [m/s].
-const SPEED: f64 = 0.15;
+const VERTICAL_SPEED: f64 = 0.15;
 /// Shares of the usual speed that are tried: near a joint's stop it may move only slowly towards it.
 const PACES: [f64; 4] = [1.0, 0.5, 0.25, 0.12];
 /// How far the tool backs off from what it pushed before it rises [m].
-const BACK: f64 = 0.02;
+const RETREAT_DISTANCE: f64 = 0.02;
 
 /// No safe way was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -96,7 +96,7 @@ impl Ways<'_> {
     /// # Errors
     /// [`WayError`].
     pub fn away(&self, from: &Joints, heading: f64) -> Result<Vec<SetPoint>, WayError> {
-        let back = Translation3::new(-BACK * heading.cos(), -BACK * heading.sin(), 0.0);
+        let back = Translation3::new(-RETREAT_DISTANCE * heading.cos(), -RETREAT_DISTANCE * heading.sin(), 0.0);
         self.paced(|pace| {
             let mut points = self.straight(from, &(back * self.place(from)), pace)?;
             points.extend(self.up(&last(&points, from), pace)?);
@@ -125,7 +125,7 @@ impl Ways<'_> {
     }
 
     fn straight(&self, from: &Joints, to: &Isometry3<f64>, pace: f64) -> Result<Vec<SetPoint>, WayError> {
-        line::travel(self.body, from, to, pace * SPEED).ok_or_else(|| self.unreachable(to))
+        line::travel(self.body, from, to, pace * VERTICAL_SPEED).ok_or_else(|| self.unreachable(to))
     }
 
     fn place(&self, q: &Joints) -> Isometry3<f64> {

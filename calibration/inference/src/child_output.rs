@@ -5,7 +5,7 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::process::{Command, ExitStatus, Stdio};
 
 /// Of a line so much is passed on at most [bytes]; what follows up to its end is thrown away.
-const LONGEST: usize = 4096;
+const MAX_LINE_BYTES: usize = 4096;
 
 /// Tells each line, without its end, until the pipe ends. Bytes that are no UTF-8 are replaced.
 pub fn lines(from: impl Read, mut take: impl FnMut(&str)) {
@@ -13,7 +13,7 @@ pub fn lines(from: impl Read, mut take: impl FnMut(&str)) {
     let mut line = Vec::new();
     loop {
         line.clear();
-        let begun = (&mut from).take(LONGEST as u64).read_until(b'\n', &mut line);
+        let begun = (&mut from).take(MAX_LINE_BYTES as u64).read_until(b'\n', &mut line);
         if begun.is_err() || line.is_empty() {
             return;
         }
@@ -104,11 +104,11 @@ mod tests {
         let mut endless = Endless { left: 100 << 20, largest: 0 };
         let mut lengths = Vec::new();
         lines(&mut endless, |line| lengths.push(line.len()));
-        assert_eq!((lengths, endless.left), (vec![LONGEST], 0));
+        assert_eq!((lengths, endless.left), (vec![MAX_LINE_BYTES], 0));
         assert!(endless.largest <= 1 << 16, "{}", endless.largest);
-        let long = [vec![b'x'; 3 * LONGEST], b"\nlast\n".to_vec()].concat();
+        let long = [vec![b'x'; 3 * MAX_LINE_BYTES], b"\nlast\n".to_vec()].concat();
         let told = told(&long);
-        assert_eq!((told.len(), told[0].len(), &told[1][..]), (2, LONGEST, "last"));
+        assert_eq!((told.len(), told[0].len(), &told[1][..]), (2, MAX_LINE_BYTES, "last"));
     }
 
     #[test]

@@ -10,9 +10,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often paused work looks whether to go on.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// How long work that keeps nothing beside its farewell may take until it has ended by itself.
-const PATIENCE: Duration = Duration::from_millis(400);
+const END_TIMEOUT: Duration = Duration::from_millis(400);
 
 /// Whether the user (or the system, with a signal) asked to end or to pause, or the time is spent. Clones share the flags.
 #[derive(Debug, Clone, Default)]
@@ -100,7 +100,7 @@ impl Interrupt {
         ctrlc::set_handler(move || {
             flag.ask();
             ending::ask();
-            std::thread::sleep(PATIENCE);
+            std::thread::sleep(END_TIMEOUT);
             flag.leave();
         })?;
         interrupt.listen_to_pauses()?;
@@ -193,7 +193,7 @@ impl Interrupt {
         }
         console::line("paused; the arm holds its pose. p (or SIGUSR2) goes on, q (or Ctrl-C) ends");
         while self.paused() && !self.asked() {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
     }
 }

@@ -55,7 +55,7 @@ struct Stored {
 }
 
 /// Bytes of the checksum at a file's end.
-const CHECKSUM: usize = 32;
+const CHECKSUM_BYTES: usize = 32;
 
 impl Stored {
     fn bytes(&self) -> Vec<u8> {
@@ -67,7 +67,7 @@ impl Stored {
 
     /// `None` where this is not what was written.
     fn read(bytes: &[u8]) -> Option<Self> {
-        let (content, checksum) = bytes.split_at_checked(bytes.len().checked_sub(CHECKSUM)?)?;
+        let (content, checksum) = bytes.split_at_checked(bytes.len().checked_sub(CHECKSUM_BYTES)?)?;
         let is_whole = Sha256::digest(content).as_slice() == checksum;
         postcard::from_bytes(content).ok().filter(|_| is_whole)
     }

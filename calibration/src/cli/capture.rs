@@ -157,8 +157,8 @@ impl ExcitationArguments {
             [] => Ok(otherwise),
             _ => Err(format!("--{flag} wants the lower number first, then a higher one")),
         };
-        if *motion == MotionKind::Ramp && duration.is_some_and(|duration| duration < ramp::SHORTEST) {
-            return Err(format!("ramps take {} s or more; give a longer --duration", ramp::SHORTEST));
+        if *motion == MotionKind::Ramp && duration.is_some_and(|duration| duration < ramp::MIN_DURATION) {
+            return Err(format!("ramps take {} s or more; give a longer --duration", ramp::MIN_DURATION));
         }
         Ok(match motion {
             MotionKind::Multisine => Kind::Multisine,

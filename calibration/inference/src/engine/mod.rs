@@ -49,11 +49,11 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// How often is looked whether the user asked for the end, so that processes nobody waits for are killed, too.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Numbers of a pose: x, y, z, then a unit quaternion w, x, y, z.
 pub const POSE: usize = 7;
 /// By so much the length of a quaternion may be off: single precision, and a bit.
-const UNIT: f64 = 1e-4;
+const QUATERNION_NORM_TOLERANCE: f64 = 1e-4;
 
 /// How an engine is started.
 #[derive(Debug, Clone)]
@@ -273,7 +273,7 @@ impl Engine {
         }
         let length = |pose: &[f64]| pose[3..].iter().map(|part| part * part).sum::<f64>().sqrt();
         // What is no number is no fault of the engine's (`physical`).
-        let off = |length: &f64| length.is_finite() && (length - 1.0).abs() > UNIT;
+        let off = |length: &f64| length.is_finite() && (length - 1.0).abs() > QUATERNION_NORM_TOLERANCE;
         if let Some(length) = numbers[rows * columns..].chunks_exact(POSE).map(length).find(off) {
             return Err(self
                 .wrong(format!("sent an orientation that is no unit quaternion, but {length:.4} long"))
@@ -335,7 +335,7 @@ fn kill_at_the_end(running: &Arc<Running>) {
                 running.kill();
             }
             drop(running);
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
     });
 }

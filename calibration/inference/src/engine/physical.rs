@@ -4,7 +4,7 @@ use super::ability::Quantity;
 use super::{POSE, Question};
 
 /// Beyond this no joint and no object has a number, as in recordings [rad, rad/s, N m, m].
-const LARGEST: f64 = 1e6;
+const MAX_PHYSICAL_VALUE: f64 = 1e6;
 
 impl Quantity {
     fn unit(self) -> &'static str {
@@ -21,7 +21,7 @@ pub(super) fn impossible(question: &Question<'_>, states: &[f64]) -> Option<Stri
     let Question { dof, readings, times, object, .. } = *question;
     let columns = readings.len() * dof;
     let (of_arm, poses) = states.split_at(times.len() * columns);
-    let is_beyond = |number: &f64| !number.is_finite() || number.abs() > LARGEST;
+    let is_beyond = |number: &f64| !number.is_finite() || number.abs() > MAX_PHYSICAL_VALUE;
     if let Some(place) = of_arm.iter().position(is_beyond) {
         let (quantity, joint, time) = (readings[place % columns / dof], place % dof + 1, times[place / columns]);
         let whose = format!("{} of joint {joint} at {time:.3} s", quantity.name());
@@ -34,7 +34,7 @@ pub(super) fn impossible(question: &Question<'_>, states: &[f64]) -> Option<Stri
 
 fn sentence(whose: &str, number: f64, unit: &str) -> String {
     let what = if number.is_finite() {
-        format!("{whose} is {number:e} {unit}, beyond {LARGEST:e}")
+        format!("{whose} is {number:e} {unit}, beyond {MAX_PHYSICAL_VALUE:e}")
     } else {
         format!("a state of the engine is no number: {whose}")
     };

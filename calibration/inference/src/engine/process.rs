@@ -15,9 +15,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often a wait looks whether the user asked for the end.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// How long a process may take to end once its input has ended, before it is killed.
-const GRACE: Duration = Duration::from_millis(400);
+const EXIT_TIMEOUT: Duration = Duration::from_millis(400);
 
 /// The processes that run, for whoever has to end them all.
 #[derive(Debug, Default)]
@@ -85,7 +85,7 @@ impl Process {
         // Where nobody takes it, the answer says why.
         let _ended = self.requests.as_ref().map(|requests| requests.send(asked));
         let answer = loop {
-            match self.answers.recv_timeout(LOOK) {
+            match self.answers.recv_timeout(POLL_INTERVAL) {
                 Err(RecvTimeoutError::Timeout) if ending::asked() => return Err(EngineError::Ending),
                 Err(RecvTimeoutError::Timeout) if began.elapsed() > limit => {
                     let (command, seconds) = (self.command.clone(), limit.as_secs());
@@ -127,7 +127,7 @@ impl Process {
     fn end(&mut self) -> ExitStatus {
         self.requests = None;
         let began = Instant::now();
-        while began.elapsed() < GRACE && !ending::asked() {
+        while began.elapsed() < EXIT_TIMEOUT && !ending::asked() {
             if let Ok(Some(status)) = self.child.try_wait() {
                 // What it started may run on.
                 self.kill();
@@ -149,7 +149,7 @@ impl Process {
     /// Its last line on standard error, after a colon.
     fn words(&self) -> String {
         // The listener may be a moment behind the end of the process.
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
         let last = self.last_words.lock().unwrap_or_else(PoisonError::into_inner);
         if last.is_empty() { String::new() } else { format!(": {last}") }
     }

@@ -6,7 +6,7 @@ use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
 
 /// So many numbers are kept at most: 128 MiB.
-const NUMBERS: usize = 1 << 24;
+const MAX_KEPT_NUMBERS: usize = 1 << 24;
 
 /// The last roll-outs, the oldest given up first.
 #[derive(Debug, Default)]
@@ -30,7 +30,7 @@ impl Recent {
     pub(super) fn keep(&mut self, key: u64, states: &Arc<Vec<f64>>) {
         self.numbers += states.len();
         self.kept.push_front((key, Arc::clone(states)));
-        while self.numbers > NUMBERS {
+        while self.numbers > MAX_KEPT_NUMBERS {
             let Some((_, given_up)) = self.kept.pop_back() else { return };
             self.numbers -= given_up.len();
         }
@@ -44,7 +44,7 @@ mod tests {
     #[test]
     fn the_oldest_are_given_up_where_room_ends() {
         let mut recent = Recent::default();
-        let third = Arc::new(vec![0.0; NUMBERS / 3]);
+        let third = Arc::new(vec![0.0; MAX_KEPT_NUMBERS / 3]);
         (0..4).for_each(|key| recent.keep(key, &third));
         assert!(recent.get(0).is_none());
         assert!((1..4).all(|key| recent.get(key).is_some()));

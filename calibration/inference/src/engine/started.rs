@@ -16,11 +16,11 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// The variable that holds the mark.
 pub(super) const VARIABLE: &str = "TWINALIGN_ENGINE";
 /// A process that forks as fast as it is killed is pursued for so long.
-const LONGEST: Duration = Duration::from_millis(500);
+const KILL_TIMEOUT: Duration = Duration::from_millis(500);
 /// How long the kernel is given to end what was killed before it is looked again.
-const LOOK: Duration = Duration::from_millis(2);
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 /// More than this of an environment is not read: the kernel starts no program with more, unless asked to [bytes].
-const MOST: u64 = 8 << 20;
+const MAX_ENVIRONMENT_BYTES: u64 = 8 << 20;
 
 /// Where what a process started is found.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,7 +46,7 @@ pub(super) fn kill(all: &[Traces]) {
     }
     let began = Instant::now();
     // Once more: what was looked at may have started another in between.
-    while !all.is_empty() && began.elapsed() < LONGEST {
+    while !all.is_empty() && began.elapsed() < KILL_TIMEOUT {
         let found = marked(all);
         if found.is_empty() {
             return;
@@ -54,7 +54,7 @@ pub(super) fn kill(all: &[Traces]) {
         for process in found {
             let _gone = pidfd_send_signal(process, Signal::KILL);
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 
@@ -67,7 +67,7 @@ fn marked(all: &[Traces]) -> Vec<OwnedFd> {
         // Held before it is looked at: where its number is given to another process in between, the signal goes to nobody.
         let process = pidfd_open(pid, PidfdFlags::empty()).ok()?;
         let mut environment = Vec::new();
-        input::open(&folder.join("environ")).ok()?.take(MOST).read_to_end(&mut environment).ok()?;
+        input::open(&folder.join("environ")).ok()?.take(MAX_ENVIRONMENT_BYTES).read_to_end(&mut environment).ok()?;
         environment.split(|byte| *byte == 0).any(|entry| marks.iter().any(|mark| mark == entry)).then_some(process)
     };
     entries.flatten().filter_map(|entry| carries(&entry.path())).collect()
