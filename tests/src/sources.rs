@@ -1,24 +1,7 @@
 //! The sources of the product as text: every file, and of each the lines that are neither tests nor comments.
 
+use crate::texts::PRODUCT;
 use std::path::Path;
-
-/// The folders with the sources of the product.
-pub const PRODUCT: [&str; 14] = [
-    "shared_mem/src",
-    "twin/splat/src",
-    "twin/fusion/src",
-    "twin/reconstruct/src",
-    "twin/urdf/src",
-    "twin/src",
-    "rt_bridge/link/src",
-    "rt_bridge/src",
-    "shared_mem/import/src",
-    "calibration/evaluation/src",
-    "calibration/inference/src",
-    "calibration/vision/src",
-    "calibration/capture/src",
-    "calibration/src",
-];
 
 /// Folders that hold no source of this tree: what is built, and what version control keeps.
 const PASSED_OVER: [&str; 2] = ["target", ".git"];

@@ -103,6 +103,24 @@ pub fn documents() -> Vec<(String, String)> {
     all.map(read).collect()
 }
 
+/// The folders with the sources of the product.
+pub const PRODUCT: [&str; 14] = [
+    "shared_mem/src",
+    "twin/splat/src",
+    "twin/fusion/src",
+    "twin/reconstruct/src",
+    "twin/urdf/src",
+    "twin/src",
+    "rt_bridge/link/src",
+    "rt_bridge/src",
+    "shared_mem/import/src",
+    "calibration/evaluation/src",
+    "calibration/inference/src",
+    "calibration/vision/src",
+    "calibration/capture/src",
+    "calibration/src",
+];
+
 /// Every string in the sources of the product, tests left out: its file, and the string with escaped line ends as spaces.
 pub fn literals() -> Vec<(String, String)> {
     let of = |source: Source| strings(source.product()).into_iter().map(move |string| (source.file.clone(), string));

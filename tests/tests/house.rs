@@ -21,7 +21,7 @@ struct Crate {
 }
 
 /// The crates from the ground up: each needs those before it alone, and of them the listed ones.
-const CRATES: [Crate; 14] = [
+const CRATES: [Crate; 16] = [
     Crate { folder: "shared_mem", name: "shared_mem", needs: &[] },
     Crate { folder: "shared_mem/import", name: "import", needs: &["shared_mem"] },
     Crate { folder: "twin/urdf", name: "urdf_rs", needs: &[] },
@@ -35,10 +35,16 @@ const CRATES: [Crate; 14] = [
     Crate { folder: "calibration/vision", name: "vision", needs: &["inference", "shared_mem", "twin"] },
     Crate { folder: "calibration/capture", name: "capture", needs: &["inference", "shared_mem", "twin"] },
     Crate { folder: "calibration/evaluation", name: "evaluation", needs: &["shared_mem", "twin"] },
+    Crate { folder: "calibration/worlds", name: "worlds", needs: &["capture", "shared_mem", "twin"] },
     Crate {
         folder: "calibration",
         name: "calibration",
-        needs: &["capture", "evaluation", "import", "inference", "shared_mem", "twin", "vision"],
+        needs: &["capture", "evaluation", "import", "inference", "shared_mem", "twin", "vision", "worlds"],
+    },
+    Crate {
+        folder: "calibration/tools",
+        name: "tools",
+        needs: &["calibration", "inference", "shared_mem", "twin", "vision", "worlds"],
     },
 ];
 
@@ -48,12 +54,17 @@ const FLOORS: &[&[&str]] = &[
     &["inference/statistics", "inference/seed", "inference/interrupt", "inference/child_output"],
     &["inference/kept"],
     &["inference/engine", "inference/estimate"],
-    &["inference/forward"],
+    &["inference/forward", "inference/likelihood"],
+    &["inference/admit", "inference/controller"],
+    &["calibration/words"],
+    &["calibration/answer"],
     &["calibration/identify/sheet", "calibration/identify/split", "calibration/identify/remarks"],
     &["calibration/identify/answer", "calibration/diagnose/answer"],
-    &["calibration/identify/run"],
+    &["calibration/identify/run", "calibration/identify/used"],
+    &["calibration/identify/options", "calibration/identify/finding", "calibration/identify/figures"],
     &["calibration/identify/arm", "calibration/identify/joint", "calibration/identify/object"],
-    &["calibration/diagnose/clips", "calibration/diagnose/criteria", "calibration/diagnose/known_gains"],
+    &["calibration/diagnose/clips", "calibration/diagnose/ground"],
+    &["calibration/diagnose/criteria", "calibration/diagnose/known_gains"],
     &["calibration/diagnose/library"],
     &["calibration/diagnose/evidence"],
     &["calibration/diagnose/fit"],
@@ -109,42 +120,21 @@ const NOT_YET: &[NotYet] = &[
     NotYet { from: "calibration/diagnose", to: "calibration/identify/arm", why: BASELINE },
 ];
 
-/// An idea that has one home in `calibration`.
+/// An idea that is to stand in one file below `calibration`.
 struct One {
     idea: &'static str,
-    /// Where it is said in code.
-    said: &'static [&'static str],
-    home: &'static str,
-    /// Files that still say it once more.
-    also: &'static [&'static str],
+    /// Where it stands in code.
+    said: &'static str,
+    /// Files that hold it today: one more is refused.
+    files: usize,
 }
 
 const ONES: &[One] = &[
-    One {
-        idea: "the median",
-        said: &["fn median("],
-        home: "calibration/inference/src/statistics.rs",
-        also: &["calibration/src/check/statistics.rs", "calibration/vision/src/viewpoint/refine.rs"],
-    },
-    One { idea: "Student's t", said: &["StudentsT"], home: "calibration/inference/src/statistics.rs", also: &[] },
-    One {
-        idea: "the penalty of random effects",
-        said: &["fn penalty("],
-        home: "calibration/inference/src/estimate/problem.rs",
-        also: &["calibration/src/diagnose/evidence/scatter.rs"],
-    },
-    One {
-        idea: "rows of an arm's clips",
-        said: &["struct ArmClips"],
-        home: "calibration/inference/src/forward/arm/mod.rs",
-        also: &["calibration/src/diagnose/evidence/arm_clips.rs"],
-    },
-    One {
-        idea: "a damped step within bounds",
-        said: &["fn bounded_step("],
-        home: "calibration/inference/src/estimate/bounded.rs",
-        also: &[],
-    },
+    One { idea: "the median", said: "fn median(", files: 3 },
+    One { idea: "Student's t", said: "StudentsT::new(", files: 1 },
+    One { idea: "the penalty of random effects", said: "fn penalty(", files: 2 },
+    One { idea: "the rows of an arm's clips", said: "struct ArmClips", files: 2 },
+    One { idea: "the damped step within bounds", said: "fn bounded_step(", files: 1 },
 ];
 
 /// The longest room that a module lies in.
@@ -217,6 +207,10 @@ fn code_stands_in_the_houses_of_the_plan_alone() {
 fn every_crate_stands_in_the_table_and_needs_what_it_says() {
     let files = product_without_tests(&root());
     for (number, own) in CRATES.iter().enumerate() {
+        if !root().join(own.folder).exists() {
+            eprintln!("{} is not there: its line can go", own.folder);
+            continue;
+        }
         let manifest = std::fs::read_to_string(root().join(own.folder).join("Cargo.toml")).expect("a manifest");
         let before = &CRATES[..number];
         for need in own.needs {
@@ -277,17 +271,13 @@ fn rooms_need_those_below_them_alone() {
 #[test]
 fn of_each_idea_there_is_one() {
     let files = product_without_tests(&root());
-    for one in ONES {
-        let says = |source: &&Source| source.code().any(|line| one.said.iter().any(|said| line.contains(said)));
+    for One { idea, said, files: known } in ONES {
+        let says = |source: &&Source| source.code().any(|line| line.contains(said));
         let ours = files.iter().filter(|source| source.file.starts_with("calibration/"));
         let found: Vec<&str> = ours.filter(says).map(|source| source.file.as_str()).collect();
-        for file in &found {
-            let known = *file == one.home || one.also.contains(file);
-            assert!(known, "{file} has {} once more; its home is {}", one.idea, one.home);
-        }
-        assert!(found.contains(&one.home), "{} holds {} no longer: where is it?", one.home, one.idea);
-        for file in one.also.iter().filter(|file| !found.contains(file)) {
-            eprintln!("{file} has {} no longer: its line can go", one.idea);
+        assert!(found.len() <= *known, "{idea} stands once more: {}", found.join(", "));
+        if found.len() < *known {
+            eprintln!("{idea} stands in {} files, and not in {known}: its number can go down", found.len());
         }
     }
 }
