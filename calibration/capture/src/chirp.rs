@@ -42,6 +42,7 @@ impl Chirp {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let swing = |limit: &JointLimits| Swing {
             phase: rng.random_range(0.0..TAU),
+            // Above the corner the acceleration stays at the amplitude times its square.
             corner: (STEADY_SHARE * LIMITS_SHARE * limit.acceleration / amplitude).sqrt(),
         };
         let joints = limits.iter().map(swing).collect();
@@ -54,6 +55,7 @@ impl Chirp {
         let Swing { phase, corner } = self.joints[joint];
         let k = self.growth;
         let w = self.lowest * (k * t).exp();
+        // The integral of w from the beginning.
         let (sin, cos) = (phase + (w - self.lowest) / k).sin_cos();
         // The phase's derivatives are w, k w and k² w.
         let wave = [sin, w * cos, k * w * cos - w * w * sin, (k * k * w - w.powi(3)) * cos - 3.0 * k * w * w * sin];
@@ -63,6 +65,7 @@ impl Chirp {
         let d1 = -2.0 * k * r * a * a;
         let d2 = -2.0 * k * (2.0 * k * r * a * a + 2.0 * r * a * d1);
         let d3 = -2.0 * k * (4.0 * k * k * r * a * a + 8.0 * k * r * a * d1 + 2.0 * r * (d1 * d1 + a * d2));
+        // A short sweep keeps half its length at its full size.
         let rise = WINDOW_RISE.min(0.25 * self.duration);
         product([a, d1, d2, d3].map(|x| self.amplitude * x), product(wave, window(t, self.duration, rise)))
     }

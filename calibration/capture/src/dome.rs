@@ -63,6 +63,7 @@ const CHECKED_EVERY: usize = 20;
 pub fn looking(from: &Point3<f64>, at: &Point3<f64>, roll: f64) -> Isometry3<f64> {
     let forwards = (at - from).normalize();
     let right = forwards.cross(&Vector3::z());
+    // Straight down no row is level: any will do.
     let right = if right.norm() > 1e-6 { right.normalize() } else { Vector3::y() };
     let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[right, forwards.cross(&right), forwards]));
     let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
@@ -108,6 +109,7 @@ impl Dome<'_> {
         let roll = |k: usize| TAU * k as f64 / ROLLS as f64;
         let mut joints: Vec<Joints> =
             (0..ROLLS).filter_map(|k| self.reach(body, limits, start, place, roll(k))).collect();
+        // The shortest way first: it is the likeliest to be free.
         joints.sort_by(|a, b| apart(a, start).total_cmp(&apart(b, start)));
         let hidden = obstacle::on_sight(self.obstacles, place, &self.at, self.radius);
         let mut least: Option<Blocked> = None;
@@ -137,7 +139,9 @@ impl Dome<'_> {
     fn places(&self, count: usize) -> impl Iterator<Item = Point3<f64>> + '_ {
         let [low, high] = ELEVATIONS.map(f64::sin);
         (0..count).map(move |k| {
+            // Even steps in height are even steps in area on a sphere.
             let z = low + (high - low) * (k as f64 + 0.5) / count as f64;
+            // The golden angle: no two turns of the spiral line up.
             let (sin, cos) = (k as f64 * TAU * 0.381_966_011_250_105).sin_cos();
             let level = (1.0 - z * z).sqrt();
             self.at + self.distance * Vector3::new(level * cos, level * sin, z)

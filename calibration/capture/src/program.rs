@@ -56,6 +56,7 @@ impl Wish {
     /// The wish for a clip by its number in the session, from 0.
     pub fn of_clip(number: usize) -> Self {
         let turn = if number.is_multiple_of(ANCHOR) { 0 } else { number };
+        // The powers of the ratio are irrational to each other: no two dimensions repeat together.
         let at = |dimension: i32| (0.5 + turn as f64 * GOLDEN.powi(-dimension)).fract();
         Self {
             heading: TAU * at(1) - PI,

@@ -84,6 +84,7 @@ pub fn plan(stroke: &Stroke, near: &Joints, limits: &[JointLimits], body: &Body)
     for i in 0..profile.samples() {
         let (way, speed) = profile.at(i as f64 / RATE);
         let place = start + along * way;
+        // From the joints before, so that the arm does not turn over to another solution.
         q = line::reach(body, &q, &upright(place, stroke.turn)).ok_or_else(|| out(&place))?;
         set_points.push(SetPoint { q_d: q, dq_d: line::joint_velocity(body, &q, &(along * speed)) });
     }
@@ -113,6 +114,7 @@ impl Profile {
     }
 
     fn samples(&self) -> usize {
+        // One more than the intervals: both ends have a set point.
         ((self.rest[0] + 2.0 * self.rise + self.cruise + self.rest[1]) * RATE).ceil() as usize + 1
     }
 

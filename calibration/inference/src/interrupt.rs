@@ -1,6 +1,5 @@
-//! What the user wants of long work while it runs: that it ends, waits, or takes no longer than so much. Flags that the work
-//! looks at between steps, so that it can stop cleanly and keep what it has. Where it does not come to look in time, the
-//! process says its farewell and ends without it.
+//! Cancellation, pause and time budget of long work: flags that it reads between steps, so that it can stop cleanly and keep
+//! what it has. Where it does not read them in time, the process says its last words and ends without it.
 
 use shared_mem::{console, ending, output};
 use signal_hook::consts::{SIGUSR1, SIGUSR2};

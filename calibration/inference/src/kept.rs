@@ -1,5 +1,5 @@
-//! What long work has found so far, so that an interruption loses nothing. The result of every step is kept by what was asked
-//! for; the same command finds it again and ends, bit by bit, where it would have ended without the interruption.
+//! The checkpoint of a computation: the result of every step is kept by what was asked for, so that an interruption loses
+//! nothing. The same command finds it again and ends, bit by bit, where it would have ended without the interruption.
 //!
 //! The file is written whole, now and then and when the work is interrupted. It belongs to one question: other clips,
 //! settings or another build of the program have a [`Fingerprint`] of their own and begin anew. How a session is spelt, and where it

@@ -8,9 +8,9 @@
 //! | [`controller`] | what clips say of the controller before a model is fitted to them |
 //! | [`engine`] | another program that simulates the arm |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
-//! | [`interrupt`] | Ctrl-C, and a budget of time |
 //! | [`likelihood`] | what the twin makes of recorded clips: residuals, and what varies from clip to clip |
-//! | [`kept`] | what long work has found so far, for when it is interrupted |
+//! | [`interrupt`] | cancellation, pause and time budget |
+//! | [`kept`] | checkpoints of a computation |
 //! | [`seed`] | what is drawn is drawn from it |
 //! | [`statistics`] | medians, and quantiles of distributions |
 //!

@@ -68,6 +68,7 @@ pub(super) fn groups(clip: &Columns) -> Vec<Group> {
 /// Root mean square speed over root mean square excursion.
 fn rate(desired: &Signals, spread: f64) -> f64 {
     let step = desired.step().max(1e-9);
+    // Over 20 ms: from row to row at 1 kHz the resolution of an encoder would be a speed.
     let stride = ((0.02 / step).round() as usize).max(1);
     let squares = desired.q.iter().map(|q| {
         let slopes =
@@ -90,6 +91,7 @@ pub(super) fn remarks(clips: &[(&Columns, Lag)]) -> Vec<Remark> {
 
 fn sigma(clip: &Columns, lag: &Lag) -> f64 {
     let step = clip.measured.step().max(clip.desired.step());
+    // Stamps are as fine as the rows: half a step beside what the fit leaves open.
     (0.5 * (lag.interval[1] - lag.interval[0]) / 1.96).hypot(LAG_SIGMA).hypot(0.5 * step)
 }
 

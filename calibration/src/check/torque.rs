@@ -154,6 +154,7 @@ fn moments(clip: &Columns, tau_t: &[f64], tau: &[Vec<f64>], dof: usize) -> Optio
             q[j] = now;
             dq[j] = (after - before) / (2.0 * half);
             let bend = (after - 2.0 * now + before) / (half * half);
+            // A second difference holds sqrt(6) times the noise of a position. Where that is too much, logged velocities are differenced.
             let coarse = 2.5 * motion.noise[j] / (half * half) > COARSE;
             ddq[j] = match slope(t - half).zip(slope(t + half)) {
                 Some((from, to)) if coarse => (to - from) / (2.0 * half),
@@ -182,6 +183,7 @@ pub fn motion(arm: &ArmModel, state: &JointState, ddq: &Joints) -> Joints {
     let gravity = arm.gravity(&state.q);
     std::array::from_fn(|j| {
         let inertial: f64 = mass[j].iter().zip(ddq).map(|(m, a)| m * a).sum();
+        // The mass matrix holds the rotors, which turn before the gear: a torque behind it does not feel them.
         inertial - rotor[j] * ddq[j] + bias[j] - gravity[j]
     })
 }
@@ -290,6 +292,7 @@ fn unit(clip: &Columns, moments: &[Moment], models: &[Model], dof: usize) -> Opt
         return None;
     }
     let meaning = format!(": {}", weight::meaning(factor));
+    // The standard error of a slope through the origin, by the correlation of its pairs.
     let half = 1.96 * (factor * factor * (1.0 / (correlation * correlation) - 1.0) / pairs().count() as f64).sqrt();
     Some(scaled(clip, factor, [factor - half, factor + half], &meaning))
 }

@@ -12,11 +12,11 @@ use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 /// Worst wake-up delay after a notification that iceoryx2 0.10 lost. A listener that empties its socket between the sender's
-/// notification and the flag that the sender sets for it waits on a flag that keeps all later notifications from being sent; it
-/// reads the flag when it waits anew.
-const TURN: Duration = Duration::from_millis(5);
-/// Shortest timeout of a socket: it is in whole microseconds, and 0 of them means for ever. A choice, well above one.
-const TICK: Duration = Duration::from_micros(100);
+/// notification and the mark the sender makes of it waits on a mark that keeps all later ones from being sent; it reads the mark when
+/// it waits anew.
+const MAX_WAKE_DELAY: Duration = Duration::from_millis(5);
+/// Shortest timeout of a socket: it counts in microseconds, and 0 of them means for ever.
+const MIN_TIMEOUT: Duration = Duration::from_micros(100);
 
 /// Receives messages of one topic, oldest first. Those that fail their check are ignored and counted: see
 /// [`Node::newly_ignored`].
@@ -127,14 +127,14 @@ impl Wake {
         let end = Instant::now() + timeout;
         loop {
             let left = end.saturating_duration_since(Instant::now());
-            let heard = if left < TICK {
+            let heard = if left < MIN_TIMEOUT {
                 self.listener.try_wait(|_| ())
             } else {
-                self.listener.timed_wait(|_| (), left.min(TURN))
+                self.listener.timed_wait(|_| (), left.min(MAX_WAKE_DELAY))
             };
             match heard {
                 // A ring that arrives just as the one before it is answered is answered with it, and wakes once more for nothing.
-                Ok(0) if left >= TICK => {}
+                Ok(0) if left >= MIN_TIMEOUT => {}
                 Ok(count) => return Ok(count > 0),
                 Err(ListenerWaitError::InterruptSignal) => return Ok(false),
                 Err(e) => return Err(TransportError::port(self.topic, e)),
