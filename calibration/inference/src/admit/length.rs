@@ -1,7 +1,7 @@
 //! How much of long clips counts: a session of hours says no more about its gap than its liveliest minutes, and every
 //! candidate simulates all that counts a hundred times.
 
-use inference::likelihood::smoothing;
+use crate::likelihood::smoothing;
 use crate::likelihood::smoothing;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, JointSeries};

@@ -12,8 +12,8 @@
 //! without knowing what acts, and makes joints stiff against a load that the twin lacks.
 //! What is fitted afterwards is searched around what these fits say with and without `c`, and without each clip in turn.
 
-use inference::likelihood::setting::complete;
-use inference::likelihood::smoothing::{derivatives, half_width};
+use crate::likelihood::setting::complete;
+use crate::likelihood::smoothing::{derivatives, half_width};
 use crate::likelihood::setting::complete;
 use crate::likelihood::smoothing::{derivatives, half_width};
 use nalgebra::{DMatrix, DVector};

@@ -1,11 +1,10 @@
 //! Where the search begins when cell.toml states gains only by wide ranges, or a delay is searched: least squares find the
 //! bottom of a valley, not the valley.
 
-use inference::likelihood::{Likelihood as _, Setting};
 use crate::estimate::{ClipModel as _, Unknown};
-use crate::likelihood::Setting;
-use crate::likelihood::arm::{ArmClips, Row};
 use crate::interrupt::Interrupt;
+use crate::likelihood::arm::ArmClips;
+use crate::likelihood::{Likelihood as _, Setting};
 use rayon::prelude::*;
 use shared_mem::cell::Cell;
 use shared_mem::msg::{Joints, MAX_JOINTS};

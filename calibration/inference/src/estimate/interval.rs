@@ -81,7 +81,7 @@ impl Intervals {
 /// How far a fit's parameters scatter, by the quadratic forms of its clips over (1, parameters): witnesses are whole clips, and their
 /// scatter is how the parameters move when each is left out (jackknife, Tukey 1958).
 pub struct Jackknife {
-    /// By the curvature, `P x P`; zero in rows of parameters that the clips say nothing about.
+    /// By the curvature, `P x P`; zero where that has no inverse.
     covariance: DMatrix<f64>,
     /// How the parameters move without each clip.
     shifts: Vec<Vec<f64>>,
@@ -91,11 +91,16 @@ impl Jackknife {
     /// Of clips whose forms add up to `total`, what is known besides added.
     pub fn new<'a>(total: &DMatrix<f64>, clips: impl Iterator<Item = &'a DMatrix<f64>>) -> Self {
         let n = total.ncols() - 1;
-        let information = total.view((1, 1), (n, n)).into_owned();
-        let free: Vec<usize> = (0..n).filter(|k| information[(*k, *k)] > 0.0).collect();
+        // Parameters of many sizes: scaled, so that rounding makes none of them uncertain.
+        let scale = DVector::from_fn(n, |k, _| total[(k + 1, k + 1)].max(f64::MIN_POSITIVE).sqrt().recip());
+        let by = |i: usize, k: usize| scale[i] * scale[k];
+        let scaled = DMatrix::from_fn(n, n, |i, k| total[(i + 1, k + 1)] * by(i, k)).cholesky();
+        let inverse = scaled.map_or_else(|| DMatrix::zeros(n, n), |factor| factor.inverse());
         let all: Vec<usize> = (1..=n).collect();
-        let covariance = spread(&inverse(&information, &free), &free, n);
-        Self { covariance, shifts: clips.map(|clip| minimum(&(total - clip), &all).at).collect() }
+        Self {
+            covariance: DMatrix::from_fn(n, n, |i, k| inverse[(i, k)] * by(i, k)),
+            shifts: clips.map(|clip| minimum(&(total - clip), &all).at).collect(),
+        }
     }
 
     /// Half the interval, at `level`, of a sum of parameters, each times a factor.
@@ -221,6 +226,24 @@ mod tests {
     #[test]
     fn where_nothing_can_be_told_there_is_no_inverse_and_no_panic() {
         assert!(inverse(&DMatrix::zeros(3, 3), &[]).is_empty());
+    }
+
+    #[test]
+    fn of_clips_that_each_tell_a_mean_the_jackknife_is_the_scatter_of_the_mean() {
+        // (x - b)^2 of clips at x = 1, 2, 3, 6.
+        let form = |x: f64| DMatrix::from_row_slice(2, 2, &[x * x, -x, -x, 1.0]);
+        let forms = [1.0, 2.0, 3.0, 6.0].map(form);
+        let total = forms.iter().fold(DMatrix::zeros(2, 2), |sum, form| sum + form);
+        // Around the mean, where the slope of the sum vanishes.
+        let moved = DMatrix::from_row_slice(2, 2, &[1.0, 3.0, 0.0, 1.0]);
+        let around = |form: &DMatrix<f64>| &moved * form * moved.transpose();
+        let forms = forms.each_ref().map(around);
+        let jackknife = Jackknife::new(&around(&total), forms.iter());
+        let variance = (4.0 + 1.0 + 0.0 + 9.0) / 3.0;
+        let expected = statistics::student(LEVEL, 3) * f64::sqrt(variance / 4.0);
+        let half = jackknife.half_width(&[(0, 1.0)], LEVEL);
+        assert!((half / expected - 1.0).abs() < 1e-6, "{half} {expected}");
+        assert!((jackknife.half_width(&[(0, 2.0)], LEVEL) / half - 2.0).abs() < 1e-12);
     }
 
     #[test]

@@ -48,7 +48,7 @@ pub struct FittedClip<V = WithOwn> {
 impl<V> FittedClip<V> {
     /// `-2 ln` of its likelihood.
     pub fn deviance(&self) -> f64 {
-        self.reduced.deviance()
+        self.reduced.form[(0, 0)] + self.reduced.volume
     }
 }
 
@@ -82,17 +82,6 @@ impl<V> Hypothesis<V> {
         let fitted = self.fitted.iter().find(|fitted| fitted.clip == clip);
         fitted.map_or_else(|| vec![0.0; count], |fitted| fitted.own.clone())
     }
-}
-
-/// A hypothesis whose clips are not linearised in its free numbers, but for those that are already.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Approached {
-    effects: Vec<usize>,
-    full: Vec<f64>,
-    free: Vec<usize>,
-    clips: Clips,
-    #[serde(skip)]
-    at: Option<Swept>,
 }
 
 /// An effect weaker than this share of the strongest that is met in practice is none: two engines with other steps and other
@@ -144,29 +133,12 @@ impl<E: Likelihood> Bench<'_, E> {
         near: Option<&Hypothesis<E::Own>>,
         effort: Effort,
     ) -> Option<Hypothesis<E::Own>> {
-        let from = self.begun_at(clips, near);
-        let step = self.fit_step("fit", (effects, &full), &from, weights, effort);
-        self.trail.0.once(&step, || self.fitted((effects, full), from, weights, effort))
-    }
-
-    /// Clips with the nuisance parameters of a hypothesis, or at rest.
-    fn begun_at(&self, clips: &[usize], near: Option<&Hypothesis<E::Own>>) -> Clips {
         let count = self.scatter.count();
         let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
-        clips.iter().map(own).collect()
-    }
-
-    fn fit_step(
-        &self,
-        name: &str,
-        (effects, full): (&[usize], &[f64]),
-        from: &Clips,
-        weights: &[f64],
-        effort: Effort,
-    ) -> Fingerprint {
-        let clips: Vec<usize> = from.iter().map(|(clip, _)| *clip).collect();
-        let step = self.step(name).with(&(effects, clips, effort)).with_numbers(full).with_numbers(weights);
-        step.with_numbers(from.iter().flat_map(|(_, own)| own))
+        let from: Clips = clips.iter().map(own).collect();
+        let step = self.step("fit").with(&(effects, clips, effort)).with_numbers(&full).with_numbers(weights);
+        let step = step.with_numbers(from.iter().flat_map(|(_, own)| own));
+        self.trail.0.once(&step, || self.fitted((effects, full), from, weights, effort))
     }
 
     /// A step of this bench by its name.
@@ -181,43 +153,6 @@ impl<E: Likelihood> Bench<'_, E> {
         weights: &[f64],
         effort: Effort,
     ) -> Option<Hypothesis<E::Own>> {
-        self.finished(self.approached((effects, full), from, weights, effort)?, weights, effort)
-    }
-
-    /// The best of fits from several starts, as [`Self::fit`] makes each: only it is linearised in the end.
-    pub fn best_fit(
-        &self,
-        (effects, starts): (&[usize], impl IntoIterator<Item = Vec<f64>>),
-        clips: &[usize],
-        weights: &[f64],
-        near: Option<&Hypothesis<E::Own>>,
-        effort: Effort,
-    ) -> Option<Hypothesis<E::Own>> {
-        let from = self.begun_at(clips, near);
-        let one = |full: Vec<f64>| {
-            let step = self.fit_step("way of a fit", (effects, &full), &from, weights, effort);
-            self.trail.0.once(&step, || self.approached((effects, full), from.clone(), weights, effort))
-        };
-        let mut ways: Vec<Approached> = starts.into_iter().filter_map(one).collect();
-        if ways.len() > 1 {
-            let costs = ways
-                .iter()
-                .map(|way| self.cost_of(way, weights, effort).unwrap_or(f64::INFINITY))
-                .collect::<Vec<f64>>();
-            let best = (0..ways.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
-            ways.swap(0, best);
-        }
-        self.finished(ways.into_iter().next()?, weights, effort)
-    }
-
-    /// A fit but for its linearisation in the end.
-    fn approached(
-        &self,
-        (effects, full): (&[usize], Vec<f64>),
-        from: Clips,
-        weights: &[f64],
-        effort: Effort,
-    ) -> Option<Approached> {
         let free = if effort.frees_held { self.all_free(effects) } else { self.free(effects) };
         let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
         let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
@@ -226,32 +161,18 @@ impl<E: Likelihood> Bench<'_, E> {
         let before_last = Effort { iterations: effort.iterations.saturating_sub(1), ..effort };
         let (Reached { full, clips, .. }, last) = self.descended((full, clips), &moving, weights, before_last)?;
         let restarted = self.restarted(&full, clips.clone(), weights);
-        let at = last.filter(|_| moving.len() == free.len() && restarted == clips);
-        Some(Approached { effects: effects.to_vec(), full, free, clips: restarted, at })
-    }
-
-    /// `-2 ln` of the likelihood of the clips: for that slopes by their nuisance parameters do.
-    fn cost_of(&self, way: &Approached, weights: &[f64], effort: Effort) -> Option<f64> {
-        let of = |at: &Swept| Some(at.reduced(self.evidence, weights).ok()?.iter().map(Reduced::deviance).sum());
-        match &way.at {
-            Some(at) => of(at),
-            None => of(&self.linearise(&way.full, &[], &way.clips, effort.precision)?),
-        }
-    }
-
-    fn finished(&self, fit: Approached, weights: &[f64], effort: Effort) -> Option<Hypothesis<E::Own>> {
-        let Approached { effects, full, free, clips, at, .. } = fit;
-        let at = match at {
+        let at = match last.filter(|_| moving.len() == free.len() && restarted == clips) {
             Some(at) => at,
-            None => self.linearise(&full, &free, &clips, effort.precision)?,
+            None => self.linearise(&full, &free, &restarted, effort.precision)?,
         };
-        Some(Hypothesis { effects, full, free, fitted: self.fitted_clips(clips, &at, weights)? })
-    }
-
-    fn fitted_clips(&self, clips: Clips, at: &Swept, weights: &[f64]) -> Option<Vec<FittedClip<E::Own>>> {
         let forms = at.reduced(self.evidence, weights).ok()?;
-        let one = |((clip, own), reduced)| FittedClip { clip, own, reduced, kind: PhantomData };
-        Some(clips.into_iter().zip(forms).map(one).collect())
+        let fitted = restarted.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip {
+            clip,
+            own,
+            reduced,
+            kind: PhantomData,
+        });
+        Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
     }
 
     /// What the clips of a hypothesis cost at `full` after one step of some numbers alone, and the numbers then. `None` when the
@@ -351,7 +272,14 @@ impl<E: Likelihood> Bench<'_, E> {
         let at = self.own_fitted(&hypothesis.full, clips, weights)?;
         let at = self.restarted(&hypothesis.full, at, weights);
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
-        self.fitted_clips(at, &swept, weights)
+        let forms = swept.reduced(self.evidence, weights).ok()?;
+        let judged = at.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip {
+            clip,
+            own,
+            reduced,
+            kind: PhantomData,
+        });
+        Some(judged.collect())
     }
 
     /// Clips with their own numbers at their best for shared ones that are given.

@@ -1,10 +1,9 @@
 //! The numbers of an effect as a person reads them: in the effect's own units, each with a 90 % interval.
 //!
-//! An interval is that of [`Jackknife`]. Where a hit lies between a number and
-//! what is seen, the step over which its slope was taken comes on top: the answer to less than that is rough. Of what was
-//! found on an arm alone the interval reaches to where the number would be without the twin's time step. Of a size on
-//! which nothing depends ([`super::undetermined`]), and of what was held and never fitted, all that is met in practice is
-//! possible.
+//! An interval is that of [`Jackknife`]. Where a hit lies between a number and what is seen, the step over which its slope was
+//! taken comes on top: the answer to less than that is rough. Of what was found on an arm alone the interval reaches to where the
+//! number would be without the twin's time step. Of a size on which nothing depends ([`super::undetermined`]), and of what was
+//! held and never fitted, all that is plausible is possible.
 
 use super::bench::{Bench, Hypothesis};
 use inference::likelihood::Evidence;
@@ -16,8 +15,8 @@ use crate::words::UNBOUNDED;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};
 
-/// Level of the intervals [1].
-const LEVEL: f64 = 0.90;
+/// Level of the intervals [1]: that of 1.645 standard deviations of a normal distribution.
+const LEVEL: f64 = 0.900_030_188_921_757_2;
 
 /// The parameters of one of a hypothesis' effects.
 pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {

@@ -70,13 +70,6 @@ pub struct Reduced {
     pub around: Around,
 }
 
-impl Reduced {
-    /// `-2 ln` of the clip's likelihood.
-    pub fn deviance(&self) -> f64 {
-        self.form[(0, 0)] + self.volume
-    }
-}
-
 /// Where a sweep stands.
 pub struct Point<'a> {
     pub full: &'a [f64],
