@@ -320,7 +320,7 @@ pub(super) mod tests {
     fn the_page_shows_values_doubts_and_where_to_go_on() {
         let page = page(&found());
         for text in [
-            "<h1>1 of 2\u{a0}numbers are identifiable; on held-out clips the twin is off by 0.100\u{a0}mrad instead of 2.000\u{a0}mrad</h1>",
+            "<h1>1\u{a0}of 2\u{a0}numbers are identifiable; on held-out clips the twin is off by 0.100\u{a0}mrad instead of 2.000\u{a0}mrad</h1>",
             "598 [592, 604] N m/rad",
             "at a bound of its search",
             "<dt>stiffness, joint 6</dt><dd>the clips move the joint too little</dd>",

@@ -58,9 +58,7 @@ impl ArmModel {
             }
             let columns = self.jacobian(&q, flange.translation.vector.into());
             let step = within_limits(limits, &q, &columns.map(|column| weighted(&Vector6::from(column))), &error);
-            let largest = largest(&step);
-            // What is no number is no correction.
-            if largest.is_nan() || largest <= SMALLEST_STEP {
+            if largest(&step) <= SMALLEST_STEP {
                 break;
             }
             q = within(limits, &moved(&q, &step));
@@ -87,13 +85,16 @@ impl ArmModel {
         for correction in 0..REACH_CORRECTIONS {
             let at = self.flange(&q).isometry() * flange_from_point;
             let error = pose_difference(&at, target);
+            // Nothing reaches what is not a number, which `amax` passes over.
+            if error.iter().any(|error| !error.is_finite()) {
+                return None;
+            }
             let size = error.amax();
             if size < REACHED {
                 return Some(q);
             }
             if correction % HALVING_CORRECTIONS == 0 {
-                // Not a number is no progress either.
-                if size.is_nan() || size > 0.5 * before {
+                if size > 0.5 * before {
                     return None;
                 }
                 before = size;
@@ -114,15 +115,16 @@ impl ArmModel {
     }
 }
 
-/// The motion of the joints that brings about `motion` as nearly as `damping` allows; zeros where there is none.
+/// The motion of the joints that brings about `motion` as nearly as `damping` allows; zeros where that is not a number.
 fn damped_step(columns: &[Vector6<f64>; MAX_JOINTS], motion: &Vector6<f64>, damping: f64) -> Joints {
     let square = columns.iter().fold(Matrix6::identity() * damping, |sum, column| sum + column * column.transpose());
-    let weights = square.cholesky().map_or_else(Vector6::zeros, |square| square.solve(motion));
-    columns.map(|column| column.dot(&weights))
+    let weights = square.cholesky().map(|square| square.solve(motion));
+    let weights = weights.filter(|weights| weights.iter().all(|weight| weight.is_finite()));
+    columns.map(|column| weights.as_ref().map_or(0.0, |weights| column.dot(weights)))
 }
 
 fn largest(step: &Joints) -> f64 {
-    step.iter().fold(0.0, |largest: f64, step| if step.is_nan() { f64::NAN } else { largest.max(step.abs()) })
+    step.iter().fold(0.0, |largest: f64, step| largest.max(step.abs()))
 }
 
 /// The joints after a step, no joint by more than [`MAX_STEP`].
