@@ -350,3 +350,6 @@ fn difference(measured: &Isometry3<f64>, predicted: &Isometry3<f64>) -> [f64; 6]
     let turn = (measured.rotation * predicted.rotation.inverse()).scaled_axis();
     [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
 }
+
+#[cfg(test)]
+mod tests;
