@@ -1,7 +1,6 @@
 //! Clips of a minute, of which the arm moves for a few seconds: what counts is where it moves, and the verdict is the same.
 
-use calibration::benchmark::session::record;
-use calibration::benchmark::world::{Fault, Kind as Motion, World};
+
 use calibration::diagnose::{Kind, Options, diagnose_clips};
 use inference::admit::Admitted;
 use inference::admit::length::liveliest;
@@ -10,6 +9,8 @@ use shared_mem::cell::Cell;
 use shared_mem::recording::{Clip, JointSeries, Session, SessionFiles};
 use shared_mem::theta::{EffectTheta, Theta};
 use std::path::Path;
+use worlds::session::record;
+use worlds::world::{Fault, Kind as Motion, World};
 
 /// Two joints, which are simulated several times faster than the arm of the shipped cell.
 const CELL: &str = "[robot]\njoints = [\"shoulder\", \"elbow\"]\n[controller]\nkind = \"joint_pd\"\nstiffness = [600.0, 400.0]\n\

@@ -1,12 +1,12 @@
 //! Logged torques tell a stiffness that cell.toml knows by a wide range alone, whatever acts besides.
 
-use calibration::benchmark::session::record;
-use calibration::benchmark::world::{Fault, Kind, World};
 use inference::controller::controlled;
 use inference::interrupt::Interrupt;
 use shared_mem::cell::{Cell, Ranges};
 use shared_mem::recording::Clip;
 use std::path::Path;
+use worlds::session::record;
+use worlds::world::{Fault, Kind, World};
 
 const CLIPS: usize = 4;
 

@@ -1,8 +1,5 @@
 //! The object from simulated strokes of which the truth is known, and from recordings of another engine.
 
-use calibration::benchmark::coverage::Subject;
-use calibration::benchmark::session::record;
-use calibration::benchmark::world::{Fault, Kind, World};
 use calibration::identify::object::{Options, identify, identify_clips};
 use calibration::identify::{Identification, Optimizer};
 use inference::estimate::ClipModel as _;
@@ -12,6 +9,8 @@ use inference::likelihood::object::{Channel, Nuisance, ObjectClips, Part, Row, d
 use inference::likelihood::setting::{complete, object_parameters};
 use shared_mem::cell::ClipKind;
 use std::path::{Path, PathBuf};
+use worlds::session::record;
+use worlds::world::{Fault, Kind, World};
 
 fn world(number: u64) -> World {
     let text = include_str!("../../config/fr3_cell.toml");
@@ -89,18 +88,7 @@ fn a_path_that_deviates_is_off_by_nothing_before_the_hit_and_by_all_of_it_where_
     }
 }
 
-/// Sessions of another engine and their truth.
-/// In this world the deviance hardly rises along friction, mass and height together, and the hits are rough: slopes, and a look
-/// at a few of their sigmas, left friction three half widths away from the truth.
-#[test]
-fn intervals_reach_as_far_as_rough_hits_leave_a_number_open() {
-    let session = Subject::Object.examine(&world(24), 8, &Interrupt::default());
-    for name in ["friction", "centre_of_mass[2]"] {
-        let printed = session.printed.iter().find(|printed| printed.name == name).expect("a number with an interval");
-        assert!(printed.holds(), "{printed:?}");
-    }
-}
-
+/// An answer to a session of another engine.
 fn recorded(name: &str, parameters: Option<PathBuf>) -> Identification {
     let data = PathBuf::from(std::env::var_os("TWINALIGN_DATA").expect("TWINALIGN_DATA"));
     let optimizer = Optimizer::LeastSquares;

@@ -1,8 +1,7 @@
 //! Arms of which no masses are known have weight all the same: it is identified with the gains, and what it leaves at rest is not
 //! taken for a cause.
 
-use calibration::benchmark::session::record;
-use calibration::benchmark::world::{Fault, Kind as Motion, World};
+
 use calibration::diagnose::{Diagnosis, Kind, Options, diagnose_clips};
 use calibration::identify::arm;
 use inference::admit::Admitted;
@@ -11,6 +10,8 @@ use shared_mem::cell::Cell;
 use shared_mem::recording::{Session, SessionFiles};
 use shared_mem::theta::Theta;
 use std::path::Path;
+use worlds::session::record;
+use worlds::world::{Fault, Kind as Motion, World};
 
 const CELL: &str = "[robot]\njoints = [\"shoulder\", \"elbow\"]\n[controller]\nkind = \"joint_pd\"\nstiffness = [30.0, 20.0]\n\
     damping = [3.0, 2.0]\nrotor_inertia = [0.3, 0.1]\n";

@@ -9,11 +9,7 @@ mod driven;
 mod golden;
 mod slides;
 
-use calibration::benchmark::draw;
-use calibration::benchmark::pairs::Changed;
-use calibration::benchmark::session::record;
 use calibration::benchmark::trial::sealed;
-use calibration::benchmark::world::{Fault, Kind, Outside, World};
 use calibration::diagnose::against::{Pair, compare_clips};
 use calibration::diagnose::{Diagnosis, Options, diagnose, diagnose_clips};
 use driven::Driven;
@@ -23,6 +19,10 @@ use serde_json::{Value, json};
 use shared_mem::cell::Cell;
 use shared_mem::msg::MAX_JOINTS;
 use std::path::Path;
+use worlds::changed::Changed;
+use worlds::draw;
+use worlds::session::record;
+use worlds::world::{Fault, Kind, Outside, World};
 
 /// What of an answer is held to what it was; texts may be said better.
 const KEPT: [&str; 4] = ["verdict", "gap", "candidates", "theta"];

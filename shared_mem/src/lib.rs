@@ -22,6 +22,8 @@
 //! | [`input`] | the one way in for files: regular ones only, each kind up to a size |
 //! | [`output`] | files that are whole or not there: every writer but the live recorder goes through it |
 //! | [`place`] | paths that are copied from one file into another |
+//! | [`interrupt`] | Ctrl-C, pauses, and a budget of time |
+//! | [`child_output`] | what other programs say on their pipes |
 //! | [`ending`] | whether the process was asked to end |
 //! | [`parent`] | programs that end when the one that started them is gone |
 //! | [`error_line()`] | an error with its causes in one line |
@@ -41,6 +43,7 @@ mod blocks;
 pub mod budget;
 pub mod cell;
 pub mod checksum;
+pub mod child_output;
 pub mod command_line;
 pub mod console;
 pub mod ending;
@@ -48,6 +51,7 @@ mod error_line;
 pub mod frames;
 pub mod hand_eye;
 pub mod input;
+pub mod interrupt;
 pub mod json;
 pub mod lens;
 pub mod msg;

@@ -3,7 +3,7 @@
     python3.11 -m venv doctors && doctors/bin/pip install baglint==0.2.1 rosbag-doctor==0.1.1 clockdoctor==0.1.0 stamplint==0.2.0 \\
         physlint==0.4.0 "deepen-grade[mcap]==0.4.1" rdq==0.3.4 lerobot-doctor==0.2.0 robovet==0.2.2 robot-data-audit==0.11.0
     doctors/bin/pip install --no-deps lerobot-lint==0.1.1
-    cargo run --release -p calibration --example check_faults -- --trials 20 --seed 1 --write sessions
+    cargo run --release -p tools --example check_faults -- --trials 20 --seed 1 --write sessions
     doctors/bin/python tests/peers/recording_doctors.py sessions --program target/release/calibration --out doctors.jsonl --jobs 2
 
 Each session becomes ROS 2 bags (storage mcap, a file a clip) and a LeRobot data set (version 3.0, a clip an episode). `calibration check` and

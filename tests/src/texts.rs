@@ -104,7 +104,7 @@ pub fn documents() -> Vec<(String, String)> {
 }
 
 /// The folders with the sources of the product.
-pub const PRODUCT: [&str; 14] = [
+pub const PRODUCT: [&str; 16] = [
     "shared_mem/src",
     "twin/splat/src",
     "twin/fusion/src",
@@ -118,6 +118,8 @@ pub const PRODUCT: [&str; 14] = [
     "calibration/inference/src",
     "calibration/vision/src",
     "calibration/capture/src",
+    "calibration/worlds/src",
+    "calibration/tools/src",
     "calibration/src",
 ];
 

@@ -3,8 +3,8 @@
 use super::admission::{Admission, AdmissionError};
 use super::link::{Link, LinkError};
 use crate::processes::{ProcessError, Program, Running, arguments};
-use inference::interrupt::Interrupt;
 use shared_mem::console;
+use shared_mem::interrupt::Interrupt;
 use shared_mem::origin::Origin;
 use std::path::Path;
 use std::time::Duration;

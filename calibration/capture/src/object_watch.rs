@@ -3,11 +3,11 @@
 
 use super::obstacle::{Obstacle, corners};
 use super::program::Standing;
-use inference::interrupt::Interrupt;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
 use shared_mem::cell::Cell;
 use shared_mem::console;
+use shared_mem::interrupt::Interrupt;
 use shared_mem::msg::object::{NamedPose, ObjectName, ObjectPose};
 use shared_mem::statistics::median;
 use shared_mem::topics::{OBJECT_POSE, OBJECT_POSES};

@@ -4,8 +4,8 @@
 //! ends its children in an order that loses nothing. A child that is dropped is ended, and one whose starter is killed ends
 //! by itself ([`shared_mem::parent`]). Called by capture, demo and sweep.
 
-use inference::child_output;
 use rustix::process::{Pid, Signal, kill_process_group};
+use shared_mem::child_output;
 use shared_mem::parent;
 use shared_mem::transport::DOMAIN_VARIABLE;
 use std::collections::VecDeque;

@@ -1,8 +1,8 @@
 //! The recorder of one clip: `rt_bridge record` as a child, which reads shared memory beside us and never slows the arm.
 
 use crate::processes::{ProcessError, Program, Running, arguments};
-use inference::interrupt::Interrupt;
 use serde::Deserialize;
+use shared_mem::interrupt::Interrupt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 

@@ -3,8 +3,8 @@
 
 use super::link::{Link, LinkError};
 use super::stream::Outcome;
-use inference::interrupt::Interrupt;
 use shared_mem::console;
+use shared_mem::interrupt::Interrupt;
 use std::time::{Duration, Instant};
 
 /// Wait before a reflex is cleared: an object comes to rest, a person sees what happened and can end it.

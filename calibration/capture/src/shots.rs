@@ -1,7 +1,7 @@
 //! Pictures of a camera that a robot holds, one at each rest of the arm: colour and, where there is any, depth of the same moment.
 
 use super::link::{Link, LinkError};
-use inference::interrupt::Interrupt;
+use shared_mem::interrupt::Interrupt;
 use shared_mem::msg::arm::ArmState;
 use shared_mem::msg::image::{ImageHeader, PixelEncoding};
 use shared_mem::time::now_ns;

@@ -3,7 +3,7 @@
 //! [`Feeder`] decides what to send from what the arm reports and is pure; [`play`] runs it over shared memory.
 
 use super::link::{Link, LinkError};
-use inference::interrupt::Interrupt;
+use shared_mem::interrupt::Interrupt;
 use shared_mem::msg::arm::{ArmMode, ArmState, MotionStatus};
 use shared_mem::msg::motion::{CHUNK_LENGTH, MotionChunk, MotionKind, STOP_SILENCE_NS, SetPoint};
 use shared_mem::time::now_ns;

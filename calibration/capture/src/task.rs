@@ -3,8 +3,8 @@
 use super::admission::Admission;
 use super::bridge::{Bridge, BridgeError, Wanted};
 use super::link::Link;
-use inference::interrupt::Interrupt;
 use serde::Serialize;
+use shared_mem::interrupt::Interrupt;
 use shared_mem::origin::Origin;
 use std::path::PathBuf;
 

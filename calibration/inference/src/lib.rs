@@ -4,7 +4,6 @@
 //! | module | owns |
 //! |---|---|
 //! | [`admit`] | which recorded clips can be used, and what each is for |
-//! | [`child_output`] | what other programs say on their pipes |
 //! | [`controller`] | what clips say of the controller before a model is fitted to them |
 //! | [`engine`] | another program that simulates the arm |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
@@ -37,12 +36,13 @@
 //! | shrink | `1 - after / before` of the mean squared residual on held-out clips |
 
 pub mod admit;
-pub mod child_output;
 pub mod controller;
 pub mod engine;
 pub mod estimate;
-pub mod interrupt;
+
 pub mod kept;
 pub mod likelihood;
 pub mod seed;
 pub mod statistics;
+
+pub use shared_mem::interrupt;

@@ -2,12 +2,13 @@
 
 use super::rules;
 use super::score::Method;
-use super::world::{Fault, Kind, Outside, World};
-use super::{draw, session, trial};
+use super::trial;
 use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::console;
 use shared_mem::progress::Progress;
+use worlds::world::{Fault, Kind, Outside, World};
+use worlds::{draw, session};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {

@@ -4,18 +4,7 @@
 use inference::statistics;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// What is wrong with a world.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Truth {
-    /// Nothing but the scatter that the cell declares.
-    Nothing,
-    /// These effects of the registry.
-    Effects(Vec<String>),
-    /// A disturbance that the registry does not describe.
-    Outside(String),
-}
+use worlds::world::Truth;
 
 /// What a method said about a world.
 #[derive(Debug, Clone, PartialEq, Serialize)]

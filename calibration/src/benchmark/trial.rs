@@ -2,9 +2,7 @@
 //! say of the very same clips.
 
 use super::rules;
-use super::score::{Case, Said, Truth};
-use super::world::World;
-
+use super::score::{Case, Said};
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::floor;
@@ -25,6 +23,7 @@ use inference::likelihood::setting;
 use shared_mem::cell::{ClipEntry, ClipKind};
 use shared_mem::progress::Progress;
 use shared_mem::recording::{Clip, Session, SessionFiles};
+use worlds::world::{Truth, World};
 
 /// Linearisations of the fits that the oracle and the rules rest on.
 const EFFORT: Effort = Effort::of(8, Precision::Joints);
@@ -147,5 +146,53 @@ fn said(found: &Diagnosis) -> Said {
         ranking: found.candidates.iter().map(|candidate| candidate.effect.clone()).collect(),
         confidence: found.verdict.confidence,
         shrink: found.gap.shrink.value,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::evidence::measured::Measured;
+    use inference::estimate::ClipModel;
+    use shared_mem::cell::Cell;
+    use std::path::Path;
+    use worlds::draw;
+    use worlds::session::record;
+    use worlds::world::{Fault, Kind};
+
+    fn shipped() -> Cell {
+        let text = include_str!("../../../config/fr3_cell.toml");
+        shared_mem::toml_file::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file")
+    }
+
+    /// Sums of squared residuals of measured channels and of torques asked for, each with its number of rows, at the truth.
+    fn left_of(world: &World, clips: &[Clip]) -> [(f64, f64); 2] {
+        let arm = ArmClips::new(&world.cell, clips, |_: &[f64]| world.hidden.clone()).expect("an arm");
+        let mut sums = [(0.0, 0.0); 2];
+        for clip in 0..clips.len() {
+            let mut out = Vec::new();
+            arm.residuals(clip, &[], &[], &mut out).expect("it can be simulated");
+            for (row, residual) in arm.rows(clip).iter().zip(&out) {
+                let (sum, count) = &mut sums[usize::from(arm.channels()[row.channel].quantity == "tau_J_d")];
+                (*sum, *count) = (*sum + residual * residual, *count + 1.0);
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn the_twin_that_knows_the_truth_leaves_of_a_world_what_is_noise_if_torques_are_of_their_period() {
+        let candidates = draw::candidates(false);
+        let elastic = candidates.iter().position(|effect| effect.name == "joint_elasticity").expect("an effect");
+        for (number, effect) in [(3, 1), (4, 1), (13, elastic)] {
+            let world = World::draw(number, Kind::Excitation, Fault::Single(effect), &shipped());
+            let clips = record(&world, 2).expect("a session");
+            let [(measured, count), (asked, of)] = left_of(&world, &clips);
+            assert!((0.8..1.5).contains(&(measured / count)), "{} sigma²", measured / count);
+            assert!(asked < of, "{} sigma² of the torque asked for, which has no noise", asked / of);
+            let later: Vec<Clip> = clips.into_iter().map(|clip| Clip { torques_end_at_rows: false, ..clip }).collect();
+            let [_, (of_next, _)] = left_of(&world, &later);
+            assert!(asked < 0.1 * of_next, "{asked} of the period that ends there, {of_next} of the next");
+        }
     }
 }

@@ -29,7 +29,6 @@
 //! | [`good_for`] | which verbs each clip is good for |
 //! | [`gate`] | what `diagnose` and `identify` take from it |
 //! | [`picture`] | what the page draws |
-//! | [`injected`] | faults put into clean sessions: how often they are found |
 
 mod columns;
 mod constant;
@@ -39,7 +38,6 @@ mod elsewhere;
 mod fall;
 pub mod gate;
 pub mod good_for;
-pub mod injected;
 pub mod lag;
 mod limits;
 mod look;

@@ -82,9 +82,9 @@ impl Ground {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::session::record;
-    use crate::benchmark::world::{Fault, Kind, World};
     use crate::diagnose::test_bench::shipped;
+    use worlds::session::record;
+    use worlds::world::{Fault, Kind, World};
 
     #[test]
     fn the_ground_is_where_the_objects_went() {

@@ -1,9 +1,6 @@
 //! Two recorded clips of a world on a bench, to try the steps of the search on.
 
 use super::library::Library;
-use crate::benchmark::draw;
-use crate::benchmark::session::record;
-use crate::benchmark::world::{Fault, Kind, World};
 
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::effort::Effort;
@@ -22,6 +19,9 @@ use shared_mem::cell::Cell;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::theta::Theta;
 use std::path::Path;
+use worlds::draw;
+use worlds::session::record;
+use worlds::world::{Fault, Kind, World};
 
 pub(super) const ONCE: Effort = Effort::of(1, Precision::Joints);
 

@@ -1,7 +1,7 @@
 //! Rows of recorded strokes: what each group of sensors tells, and that what is said without a simulation is what a simulation says.
 
 use super::test_bench::{on_strokes, shipped};
-use crate::benchmark::world::{Fault, Kind, World};
+use worlds::world::{Fault, Kind, World};
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::sweep::Precision;
 use inference::estimate::ClipModel as _;

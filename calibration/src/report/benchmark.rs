@@ -110,7 +110,8 @@ fn curve(cases: &[Case]) -> Markup {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::benchmark::score::{Said, Truth};
+    use crate::benchmark::score::Said;
+    use worlds::world::Truth;
 
     fn case(truth: Truth, verdict: &str, effects: &[&str]) -> Case {
         let effects: Vec<String> = effects.iter().map(|effect| (*effect).to_owned()).collect();

@@ -203,12 +203,12 @@ fn times_noise(judged: &Judged<'_>) -> String {
 mod tests {
     use super::super::verdict::tests::finding;
     use super::*;
-    use crate::benchmark::world::{Fault, World};
     use crate::diagnose::fit::bench::Hypothesis;
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::judge::score::Predicted;
     use crate::diagnose::judge::trial::Step;
     use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped};
+    use worlds::world::{Fault, World};
 
     fn hypothesis(effects: &[usize], full: &[f64]) -> Hypothesis {
         Hypothesis { effects: effects.to_vec(), full: full.to_vec(), free: Vec::new(), fitted: Vec::new() }
@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn every_reason_for_ruling_out_speaks_against_the_candidate() {
         let cell = shipped();
-        let world = World::draw(3, crate::benchmark::world::Kind::Strokes, Fault::Nothing, &cell);
+        let world = World::draw(3, worlds::world::Kind::Strokes, Fault::Nothing, &cell);
         on_strokes((&cell, &world), |bench, _| {
             let start = bench.library.start();
             let of_arm = (0..bench.library.candidates.len()).filter(|k| bench.library.candidates[*k].is_of_arm());

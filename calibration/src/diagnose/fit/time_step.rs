@@ -40,12 +40,12 @@ pub fn error<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::Kind;
     use crate::diagnose::fit::effort::Effort;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{on_bench, shipped, truth, with_effect};
     use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
+    use worlds::world::Kind;
 
     /// The world is integrated in other steps than the twin's, so its friction is another in the twin.
     #[test]

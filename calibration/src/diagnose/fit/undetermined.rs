@@ -70,12 +70,12 @@ fn held(mut hypothesis: Hypothesis, number: usize, value: f64) -> Hypothesis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::{Kind, World};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
     use inference::likelihood::setting;
     use shared_mem::theta::Theta;
     use twin::arm::MAX_JOINTS;
+    use worlds::world::{Kind, World};
 
     #[test]
     fn a_vertical_joint_s_encoder_may_be_off_by_any_angle_and_no_other_s() {

@@ -199,11 +199,11 @@ fn mean(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::Kind;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
     use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
+    use worlds::world::Kind;
 
     fn residuals(sizes: &[f64]) -> Residuals {
         let clips = sizes.iter().enumerate().map(|(clip, size)| (clip, vec![*size; 10])).collect();

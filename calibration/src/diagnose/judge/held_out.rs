@@ -62,11 +62,11 @@ pub(in crate::diagnose) fn estimated<E: Evidence>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::Kind;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
     use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
+    use worlds::world::Kind;
 
     #[test]
     fn a_command_is_judged_by_numbers_that_were_found_without_it() {

@@ -120,13 +120,13 @@ mod tests {
     use super::super::score::Predicted;
     use super::super::trial::Trial;
     use super::*;
-    use crate::benchmark::world::Kind;
     use crate::diagnose::fit::bench::Hypothesis;
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
     use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
+    use worlds::world::Kind;
 
     fn likelier(nats: f64) -> Predicted {
         Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() }

@@ -94,10 +94,10 @@ fn sentence(test: &StageTest) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::session::record;
-    use crate::benchmark::world::{Kind, World};
     use crate::diagnose::test_bench::{shipped, with_effect};
     use inference::likelihood::setting;
+    use worlds::session::record;
+    use worlds::world::{Kind, World};
 
     /// The test of strokes in a world under what the laboratory knows, with the true gains and object.
     fn of(world: &World) -> StageTest {

@@ -157,8 +157,8 @@ fn sum(gains: &[f64]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::{Fault, Kind, World};
     use crate::diagnose::test_bench::{ONCE, on_strokes, shipped};
+    use worlds::world::{Fault, Kind, World};
 
     #[test]
     fn a_clip_left_out_is_simulated_where_its_linearisation_says_that_it_falls_far_off() {

@@ -238,13 +238,13 @@ fn robust(columns: &DMatrix<f64>, wanted: &DVector<f64>) -> Option<DVector<f64>>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::{Fault, Kind, World};
     use crate::diagnose::test_bench::{ONCE, on_bench};
     use inference::likelihood::setting;
     use shared_mem::cell::Cell;
     use shared_mem::msg::MAX_JOINTS;
     use shared_mem::theta::{ArmTheta, Theta};
     use std::path::Path;
+    use worlds::world::{Fault, Kind, World};
 
     const CELL: &str = "[robot]\njoints = [\"shoulder\", \"elbow\"]\n[controller]\nkind = \"joint_pd\"\n\
                         stiffness_range = [0.5, 200.0]\ndamping_range = [0.0, 40.0]\n";

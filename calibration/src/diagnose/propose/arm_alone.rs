@@ -150,7 +150,7 @@ impl<E: Evidence> Likelihood for ArmAlone<'_, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::{Fault, Kind, World};
+
     use crate::diagnose::fit::effort::Effort;
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::judge::gap::Typical;
@@ -159,6 +159,7 @@ mod tests {
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
     use inference::likelihood::Group;
+    use worlds::world::{Fault, Kind, World};
 
     /// The baseline as it is hidden in a world.
     fn hidden_baseline(library: &Library, world: &World) -> Vec<f64> {

@@ -98,11 +98,11 @@ pub(in crate::diagnose) fn start<E: Likelihood>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::{Fault, Kind, World};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped};
     use inference::likelihood::setting;
     use shared_mem::theta::{EffectTheta, Theta};
+    use worlds::world::{Fault, Kind, World};
 
     #[test]
     fn every_joint_is_met_at_its_own_order() {

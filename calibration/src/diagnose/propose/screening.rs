@@ -110,8 +110,8 @@ pub(in crate::diagnose) fn overlooked<E: Evidence>(bench: &Bench<'_, E>, step: &
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::{Fault, Kind, World};
     use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_strokes, shipped};
+    use worlds::world::{Fault, Kind, World};
 
     #[test]
     fn a_gap_of_the_object_has_every_effect_on_the_slide_fitted_though_slopes_do_not_point_there() {

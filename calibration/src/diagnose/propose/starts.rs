@@ -338,14 +338,15 @@ fn aside<E: Likelihood>(bench: &Bench<'_, E>, scored: &Scored, shares: &[f64]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::session::record;
-    use crate::benchmark::world::{Fault, Kind, World};
+
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, on_strokes, shipped, with_effect};
     use inference::likelihood::arm::ArmClips;
     use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
     use shared_mem::theta::{EffectTheta, Theta};
+    use worlds::session::record;
+    use worlds::world::{Fault, Kind, World};
 
     #[test]
     fn limits_of_the_torque_are_found_joint_by_joint_though_no_slope_leads_there() {

@@ -121,11 +121,11 @@ pub(in crate::diagnose) fn without_superfluous<E: Evidence>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::world::Kind;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{on_bench, shipped, truth, with_effect};
     use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
+    use worlds::world::Kind;
 
     #[test]
     fn friction_that_creeps_further_than_usual_is_found_to_do_so() {

@@ -54,8 +54,6 @@ pub(super) fn taken_out(fit: &mut Fit, unknowns: &[Unknown], error: &[f64]) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::session::record;
-    use crate::benchmark::world::{Fault, Kind, World};
     use crate::identify::arm::Numbers;
     use inference::estimate::fit;
     use inference::likelihood::Settings;
@@ -65,6 +63,8 @@ mod tests {
     use inference::estimate::Schedule;
     use shared_mem::cell::Cell;
     use std::path::Path;
+    use worlds::session::record;
+    use worlds::world::{Fault, Kind, World};
 
     #[test]
     fn gains_of_an_arm_that_was_integrated_finer_come_out_as_they_are() {

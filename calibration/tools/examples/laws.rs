@@ -1,18 +1,18 @@
 //! Whether a diagnosis is as right under other control laws as under joint impedance: sealed worlds, each with one effect hidden in
 //! its arm, whose robot is led by each law in turn.
 //!
-//! `cargo run --release -p calibration --example laws -- --worlds 4 --seed 1 [--clips 6] [--law joint_pd]`
+//! `cargo run --release -p tools --example laws -- --worlds 4 --seed 1 [--clips 6] [--law joint_pd]`
 
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 
-use calibration::benchmark::session::record;
 use calibration::benchmark::trial::examine;
-use calibration::benchmark::world::{Fault, Kind, World};
 use clap::Parser;
-use inference::interrupt::Interrupt;
 use shared_mem::cell::{Cell, Controller, ControllerKind};
 use shared_mem::console;
+use shared_mem::interrupt::Interrupt;
 use std::path::PathBuf;
+use worlds::session::record;
+use worlds::world::{Fault, Kind, World};
 
 #[derive(Debug, Parser)]
 struct Arguments {

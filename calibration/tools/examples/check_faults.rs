@@ -1,7 +1,7 @@
 //! How often `calibration check` finds each fault of a recording, and how often it finds one where there is none: every fault is
 //! put into clean sessions, seed by seed.
 //!
-//! `cargo run --release -p calibration --example check_faults -- --trials 50 --seed 1 [SESSION...]`
+//! `cargo run --release -p tools --example check_faults -- --trials 50 --seed 1 [SESSION...]`
 //!
 //! Without sessions they are simulated: motions, motions at two speeds, strokes, tosses, and sessions with an effect of the twin,
 //! which is a cause and no fault. Recorded sessions that are given are taken for clean, and stand beside the simulated ones.
@@ -10,7 +10,6 @@
 
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 
-use calibration::check::injected::{Clean, Injected, Sort, Trial, inject, table};
 use clap::Parser;
 use rayon::prelude::*;
 use serde_json::json;
@@ -19,6 +18,7 @@ use shared_mem::progress::Progress;
 use shared_mem::recording::{JointSeries, Session};
 use shared_mem::{console, output};
 use std::path::{Path, PathBuf};
+use tools::injected::{Clean, Injected, Sort, Trial, inject, table};
 
 #[derive(Debug, Parser)]
 struct Arguments {

@@ -2,7 +2,7 @@
 //!
 //! Excitations and strokes are drawn from the world's number, so no two worlds see the same motion.
 
-use super::world::{Kind, Outside, World};
+use crate::world::{Kind, Outside, World};
 use capture::body::Body;
 use capture::limits;
 use capture::plan;
@@ -307,11 +307,10 @@ fn effect(name: &str, parameter: &str, value: f64) -> EffectTheta {
 
 #[cfg(test)]
 mod tests {
-    use super::super::world::Fault;
     use super::*;
-    use inference::estimate::ClipModel;
     use inference::likelihood::Likelihood as _;
     use inference::likelihood::arm::ArmClips;
+    use crate::world::Fault;
     use shared_mem::cell::Cell;
     use std::path::Path;
 
@@ -332,37 +331,6 @@ mod tests {
             let (way, end) = ((place(last) - place(0)).norm(), (place(last) - place(last - 5)).norm());
             assert!(way > 0.03, "it was hit: {way} m");
             assert!(end < 0.006, "it rests: {end} m");
-        }
-    }
-
-    /// Sums of squared residuals of measured channels and of torques asked for, each with its number of rows, at the truth.
-    fn left_of(world: &World, clips: &[Clip]) -> [(f64, f64); 2] {
-        let arm = ArmClips::moments(&world.cell, clips, |_: &[f64]| world.hidden.clone()).expect("an arm");
-        let mut sums = [(0.0, 0.0); 2];
-        for clip in 0..clips.len() {
-            let mut out = Vec::new();
-            arm.residuals(clip, &[], &[], &mut out).expect("it can be simulated");
-            for (row, residual) in arm.rows(clip).iter().zip(&out) {
-                let (sum, count) = &mut sums[usize::from(arm.channels()[row.channel].quantity == "tau_J_d")];
-                (*sum, *count) = (*sum + residual * residual, *count + 1.0);
-            }
-        }
-        sums
-    }
-
-    #[test]
-    fn the_twin_that_knows_the_truth_leaves_of_a_world_what_is_noise_if_torques_are_of_their_period() {
-        let candidates = crate::benchmark::draw::candidates(false);
-        let elastic = candidates.iter().position(|effect| effect.name == "joint_elasticity").expect("an effect");
-        for (number, effect) in [(3, 1), (4, 1), (13, elastic)] {
-            let world = World::draw(number, Kind::Excitation, Fault::Single(effect), &shipped());
-            let clips = record(&world, 2).expect("a session");
-            let [(measured, count), (asked, of)] = left_of(&world, &clips);
-            assert!((0.8..1.5).contains(&(measured / count)), "{} sigma²", measured / count);
-            assert!(asked < of, "{} sigma² of the torque asked for, which has no noise", asked / of);
-            let later: Vec<Clip> = clips.into_iter().map(|clip| Clip { torques_end_at_rows: false, ..clip }).collect();
-            let [_, (of_next, _)] = left_of(&world, &later);
-            assert!(asked < 0.1 * of_next, "{asked} of the period that ends there, {of_next} of the next");
         }
     }
 

@@ -1,17 +1,17 @@
 //! The doctor of a recording in small: clean sessions get no remark, every fault that is put into them is found, and every
 //! remark stands in the documents.
 
-use calibration::check::injected::{Clean, Injected, Sort, Trial};
 use calibration::check::{Fault, Remark, Severity, check_clips};
 use shared_mem::cell::Cell;
 use shared_mem::recording::Clip;
 use shared_mem::toml_file;
 use std::path::Path;
 use std::sync::LazyLock;
+use tools::injected::{Clean, Injected, Sort, Trial};
 
 const SORTS: [Sort; 4] = [Sort::Motions, Sort::Paces, Sort::Strokes, Sort::Tosses];
 static SHIPPED: LazyLock<Cell> = LazyLock::new(|| {
-    let text = include_str!("../../config/fr3_cell.toml");
+    let text = include_str!("../../../config/fr3_cell.toml");
     toml_file::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file")
 });
 static CLEAN: LazyLock<Vec<Clean>> =
@@ -86,7 +86,7 @@ fn one_fault_is_one_remark_for_all_clips_that_have_it() {
 
 #[test]
 fn every_remark_stands_in_the_documents_and_no_other() {
-    let text = include_str!("../../docs/check.md");
+    let text = include_str!("../../../docs/check.md");
     let table = text.split("## Remarks").nth(1).and_then(|rest| rest.split("\n## ").next()).expect("the table");
     let rows = table.lines().filter_map(|line| line.strip_prefix("| `"));
     let named: Vec<&str> = rows.filter_map(|row| row.split('`').next()).collect();

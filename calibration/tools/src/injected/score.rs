@@ -3,8 +3,8 @@
 use super::damage::inject;
 use super::faults::Injected;
 use super::sessions::Clean;
-use crate::check::check_clips;
-use crate::check::remark::Fault;
+use calibration::check::check_clips;
+use calibration::check::remark::Fault;
 use std::collections::BTreeMap;
 
 /// One session with a fault, or without.

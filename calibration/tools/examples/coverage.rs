@@ -1,21 +1,21 @@
 //! How often printed intervals hold the truth: sessions of worlds drawn from their numbers, identified or diagnosed, a line
 //! for every number that was printed with an interval. What is done stands in a file, so that the same command goes on.
 //!
-//! `cargo run --release -p calibration --example coverage -- SUBJECT --sessions 100 --seed 1 --out sessions.json`
+//! `cargo run --release -p tools --example coverage -- SUBJECT --sessions 100 --seed 1 --out sessions.json`
 //!
 //! `SUBJECT`: `arm` (with `--also EFFECT` in worlds in which that effect acts), `object`, `diagnose-arm`, `diagnose-object`.
 
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 
-use calibration::benchmark::coverage::{Session, Subject, table};
-use calibration::benchmark::world::Kind;
 use clap::{Parser, ValueEnum};
-use inference::interrupt::Interrupt;
 use serde::{Deserialize, Serialize};
 use shared_mem::cell::Cell;
+use shared_mem::interrupt::Interrupt;
 use shared_mem::{console, input, output};
 use std::path::PathBuf;
 use std::time::Instant;
+use tools::coverage::{Session, Subject, table};
+use worlds::world::Kind;
 
 #[derive(Debug, Parser)]
 struct Arguments {

@@ -1,7 +1,7 @@
 //! How often the 90 % intervals of `calibration hand-eye` hold the truth, how far the mount is off, and how often a wrong picture is
 //! found: simulated pictures, corners and arm's poses with noise, drawn anew for every seed.
 //!
-//! `cargo run --release -p calibration --example hand_eye -- [SEEDS]`
+//! `cargo run --release -p tools --example hand_eye -- [SEEDS]`
 
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 

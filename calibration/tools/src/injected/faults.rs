@@ -1,7 +1,7 @@
 //! Every fault that foreign logs are known to have: its name, the remarks that find it, the sessions that can have it.
 
 use super::sessions::Clean;
-use crate::check::remark::Fault;
+use calibration::check::remark::Fault;
 use shared_mem::cell::ClipKind;
 
 /// What is put into a session.

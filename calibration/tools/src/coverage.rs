@@ -1,20 +1,22 @@
 //! Whether the intervals that identification and diagnosis print hold the truth as often as they say: sessions of sealed
 //! worlds, every number that is printed with an interval, and how often the truth lies inside.
 
-use super::score::{Rate, Truth};
-use super::session::record;
-use super::world::{Fault, Kind, World};
-use super::{draw, trial};
-use crate::diagnose::{self, Diagnosis, diagnose_clips};
-use crate::identify::{Identification, arm, object};
-use inference::interrupt::Interrupt;
+use calibration::benchmark::score::Rate;
+use calibration::benchmark::trial;
+use calibration::diagnose::{self, Diagnosis, diagnose_clips};
+use calibration::answer::identification::Parameter;
+use calibration::identify::{Identification, arm, object};
 use inference::statistics;
 use serde::{Deserialize, Serialize};
 use shared_mem::cell::Cell;
+use shared_mem::interrupt::Interrupt;
 use shared_mem::theta::Theta;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use toml::Value;
+use worlds::draw;
+use worlds::session::record;
+use worlds::world::{Fault, Kind, Truth, World};
 
 /// Whose intervals are held against the truth.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -116,7 +118,7 @@ impl Subject {
 }
 
 fn of_identification(found: &Identification, truth: &Theta) -> Vec<Printed> {
-    let of = |(name, parameter): (&String, &crate::answer::identification::Parameter)| {
+    let of = |(name, parameter): (&String, &Parameter)| {
         let values = parameter.value.iter().copied().zip(parameter.ci95.iter().copied());
         printed(name, values, &numbers(truth, name))
     };

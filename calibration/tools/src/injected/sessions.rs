@@ -1,7 +1,5 @@
 //! Clean sessions of known worlds. A session is a pure function of its sort and number.
 
-use crate::benchmark::session::{SessionError, record_paced};
-use crate::benchmark::world::{Fault, Kind, World};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -14,6 +12,8 @@ use shared_mem::theta::Theta;
 use std::f64::consts::PI;
 use twin::rollout::{CellRollout, CellTrace, Course, ObjectState};
 use twin::sim::SimError;
+use worlds::session::{SessionError, record_paced};
+use worlds::world::{Fault, Kind, World};
 
 /// Sorts of sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,16 +1,15 @@
 //! How exactly `calibration viewpoint` finds the simulated cell's camera from random starts, and what the particle swarm
 //! needs for it.
 //!
-//! `cargo run --release -p calibration --example viewpoint_trials -- [TRIALS] [PICTURES] [SWARM TRIALS]`
+//! `cargo run --release -p tools --example viewpoint_trials -- [TRIALS] [PICTURES] [SWARM TRIALS]`
 //!
 //! How often its 95 % intervals hold the truth: cameras anywhere around the cell, arm poses, noise and blur of the pictures,
 //! and starts, all drawn anew for every view; axis by axis.
 //!
-//! `cargo run --release -p calibration --example viewpoint_trials -- coverage [VIEWS] [PICTURES] [colour|silhouette|depth] [SEED]`
+//! `cargo run --release -p tools --example viewpoint_trials -- coverage [VIEWS] [PICTURES] [colour|silhouette|depth] [SEED]`
 
 #![allow(clippy::print_stdout, reason = "its output is the measurement")]
 
-use calibration::benchmark::coverage::{Printed, Session, table};
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::StandardNormal;
@@ -18,6 +17,7 @@ use rand_pcg::Pcg64;
 use shared_mem::cell::{Camera, CameraPose, Cell};
 use std::path::Path;
 use std::time::Instant;
+use tools::coverage::{Printed, Session, table};
 use twin::render::{Hand, RobotSurface};
 use twin::scene::SceneSnapshot;
 use twin::sensors::camera::SimCamera;
@@ -41,7 +41,7 @@ fn main() -> anyhow::Result<()> {
     }
     let count = |n: usize, default: usize| std::env::args().nth(n).map_or(Ok(default), |text| text.parse());
     let (trials, pictures, swarms) = (count(1, 100)?, count(2, 1)?, count(3, 2)?);
-    let mut cell = Cell::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml"))?;
+    let mut cell = Cell::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/fr3_cell.toml"))?;
     cell.object_mut().expect("an object").pose_noise = None;
     let camera = cell.camera.clone().unwrap_or_default();
     let truth = camera.base_from_camera().expect("a pose").isometry().inverse();
@@ -129,7 +129,7 @@ fn coverage() -> anyhow::Result<()> {
         Some("depth") => Source::Depth,
         Some(other) => anyhow::bail!("{other} is none of colour, silhouette, depth"),
     };
-    let cell = Cell::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml"))?;
+    let cell = Cell::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/fr3_cell.toml"))?;
     let mut sessions = Vec::new();
     for view in seed..seed + views {
         let session = seen(&cell, source, pictures, view)?;

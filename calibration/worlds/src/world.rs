@@ -3,10 +3,10 @@
 //! True gains lie within 20 % of the nominal ones, the object anywhere in half of its known ranges; friction scatters from
 //! clip to clip, in every second world twice as much as the cell declares.
 
-use super::draw;
-use super::score::Truth;
+use crate::draw;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use serde::Serialize;
 use shared_mem::cell::{Cell, Range};
 use shared_mem::theta::{ArmTheta, EffectTheta, ObjectTheta, Theta};
 
@@ -67,6 +67,18 @@ impl Outside {
             Self::Exposure => "exposure",
         }
     }
+}
+
+/// What is wrong with a world.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Truth {
+    /// Nothing but the scatter that the cell declares.
+    Nothing,
+    /// These effects of the registry.
+    Effects(Vec<String>),
+    /// A disturbance that the registry does not describe.
+    Outside(String),
 }
 
 #[derive(Debug, Clone)]

@@ -1,17 +1,11 @@
-//! Two sessions of one world: between them one thing changed, or nothing. What `diagnose --against` says of them.
+//! Two worlds that one session each is recorded in: between them one thing changed, or nothing.
 //!
 //! The second session has other motions and other noise. In every second pair the gears have dry friction in both sessions, as in
 //! any real arm.
 
-use super::session::record;
-use super::trial::sealed;
-use super::world::{Fault, Kind, World};
-use crate::diagnose::against::{Comparison, Pair, compare_clips};
-use crate::diagnose::{self, Options, Status};
-use inference::interrupt::Interrupt;
+use crate::world::{Fault, Kind, World};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use serde::{Deserialize, Serialize};
 use shared_mem::cell::Cell;
 use shared_mem::theta::EffectTheta;
 
@@ -35,26 +29,6 @@ pub enum Changed {
 /// Those in which something changes.
 pub const CHANGES: [Changed; 5] =
     [Changed::Payload, Changed::JointFriction, Changed::Gain, Changed::Delay, Changed::TableFriction];
-
-/// What came of one pair.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
-    /// Number of the world.
-    pub world: u64,
-    /// What changed; empty where nothing did.
-    pub truth: String,
-    /// True change of its first number.
-    pub size: f64,
-    pub verdict: String,
-    /// What it names.
-    pub changes: Vec<String>,
-    /// The change that was found of the first number of what changed, with its interval; none where it was not found.
-    pub found: Option<(f64, [f64; 2])>,
-    /// Share of B's gap that closes.
-    pub shrink: f64,
-    /// Wall-clock time [s].
-    pub seconds: f64,
-}
 
 impl Changed {
     /// The name under which a comparison tells it; empty for nothing.
@@ -129,43 +103,6 @@ impl Changed {
             }
         }
     }
-
-    /// Has a pair of so many clips each compared.
-    ///
-    /// # Errors
-    /// When a world gives no session, or the pair cannot be compared.
-    pub fn examine(self, number: u64, (clips, cell): (usize, &Cell), interrupt: &Interrupt) -> anyhow::Result<Outcome> {
-        let (worlds, size) = self.worlds(number, cell);
-        let [a, b] = [sealed(&worlds[0], record(&worlds[0], clips)?), sealed(&worlds[1], record(&worlds[1], clips)?)];
-        let pair = Pair::of([a.1, b.1], false, Vec::new());
-        let options = Options { seed: number, ..Options::default() };
-        let found = compare_clips([&a.0, &b.0], &pair, &options, interrupt)?;
-        Ok(self.outcome(number, size, &found))
-    }
-
-    fn outcome(self, number: u64, size: f64, found: &Comparison) -> Outcome {
-        let kind = match found.verdict.kind {
-            diagnose::Kind::None => "none",
-            diagnose::Kind::Named => "named",
-            diagnose::Kind::Class => "class",
-            diagnose::Kind::Unexplained => "unexplained",
-            diagnose::Kind::NotTestable => "not_testable",
-        };
-        let changed = found.candidates.iter().find(|candidate| {
-            candidate.name == self.name() && matches!(candidate.status, Status::Named | Status::Possible)
-        });
-        let first = changed.and_then(|candidate| candidate.parameters.values().next());
-        Outcome {
-            world: number,
-            truth: self.name().to_owned(),
-            size,
-            verdict: kind.to_owned(),
-            changes: found.verdict.changes.clone(),
-            found: first.map(|values| (values.change[0], values.ci95[0])),
-            shrink: found.gap.shrink.value,
-            seconds: found.seconds,
-        }
-    }
 }
 
 /// Numbers of worlds that differ by this have other motions and other noise.
@@ -187,25 +124,6 @@ fn joint_friction(strongest: f64, cell: &Cell) -> EffectTheta {
 fn first_of(effect: &EffectTheta) -> f64 {
     let levels = effect.parameters.values().next().and_then(toml::Value::as_array);
     levels.and_then(|levels| levels.first()).and_then(toml::Value::as_float).unwrap_or(0.0)
-}
-
-impl Outcome {
-    /// Whether what it says is right: the change named, alone or in a class; nothing where nothing changed.
-    pub fn is_right(&self) -> bool {
-        if self.truth.is_empty() {
-            return !matches!(self.verdict.as_str(), "named" | "class");
-        }
-        match self.verdict.as_str() {
-            "named" => self.changes == [self.truth.clone()],
-            "class" => self.changes.contains(&self.truth),
-            _ => false,
-        }
-    }
-
-    /// Whether the interval holds the true change; none where it was not found.
-    pub fn holds(&self) -> Option<bool> {
-        self.found.map(|(_, [low, high])| (low..=high).contains(&self.size))
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Cancellation, pause and time budget of long work: flags that it reads between steps, so that it can stop cleanly and keep
 //! what it has. Where it does not read them in time, the process says its last words and ends without it.
 
-use shared_mem::{console, ending, output};
+use crate::{console, ending, output};
 use signal_hook::consts::{SIGUSR1, SIGUSR2};
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -72,7 +72,7 @@ impl Interrupt {
     }
 
     /// The same for work that says at its end what it has, and cuts short what it is doing: the end is asked of every reader and
-    /// every roll-out too ([`shared_mem::ending`]).
+    /// every roll-out too ([`ending`]).
     ///
     /// # Errors
     /// As [`Interrupt::listen`].
