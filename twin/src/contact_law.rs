@@ -12,7 +12,7 @@ pub struct ContactLaw {
 }
 
 /// A hard tip on a hard box: 0.3 kg part from the tool after 1 to 2 ms. Half or twice as much moves the mean gap of the
-/// clips in `tests/sliding_clips.rs` by up to 0.6 mm.
+/// clips in `tests/simulation/sliding_clips.rs` by up to 0.6 mm.
 pub const STIFFNESS: f64 = 2.0e6;
 /// Such tips and boxes bounce little. 0.135, that of a critically damped contact, and 0.3 move the same gap by up to 1 mm.
 pub const RESTITUTION: f64 = 0.25;

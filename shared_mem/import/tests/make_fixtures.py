@@ -4,7 +4,7 @@
     python3 -m venv venv && venv/bin/pip install -r shared_mem/import/tests/requirements.txt
     venv/bin/python shared_mem/import/tests/make_fixtures.py shared_mem/import/tests/fixtures
 
-The motion is a formula (see `motion` below, and `motion` of tests/formats.rs), so that a test knows every number.
+The motion is a formula (see `motion` below, and `motion` of tests/logs/formats.rs), so that a test knows every number.
 """
 
 import json

@@ -13,7 +13,7 @@ use super::touch::Touch;
 use crate::contact_law::ContactLaw;
 use nalgebra::Vector3;
 
-/// Angle of the oscillator in a step [rad]. Half of it moves the mean gap of the clips in `tests/sliding_clips.rs` by 0.3 mm
+/// Angle of the oscillator in a step [rad]. Half of it moves the mean gap of the clips in `tests/simulation/sliding_clips.rs` by 0.3 mm
 /// at most, nearly all of it in one stroke of which every small change makes another.
 const STEP_ANGLE: f64 = 0.15;
 

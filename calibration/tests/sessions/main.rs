@@ -1,0 +1,19 @@
+//! What sessions of a known truth say.
+
+mod arm_session;
+mod command_line;
+#[path = "../driven/mod.rs"]
+mod driven;
+mod foreign_logs;
+mod hand_eye;
+mod identify_arm;
+mod identify_joint;
+mod keeping;
+mod long_clips;
+mod measured_stiffness;
+mod object;
+mod objects_alone;
+#[path = "../slides/mod.rs"]
+mod slides;
+mod torques;
+mod unknown_weight;
