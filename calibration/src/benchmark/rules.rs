@@ -12,10 +12,10 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::shortlist;
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
+use inference::admit::Split;
+use inference::estimate::quadratic::minimum;
 use inference::likelihood::Evidence;
 use inference::likelihood::random_effects::RandomEffects;
-use inference::estimate::quadratic::minimum;
-use inference::admit::Split;
 use nalgebra::DMatrix;
 
 /// Names in the order of [`all`].

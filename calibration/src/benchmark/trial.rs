@@ -167,7 +167,7 @@ mod tests {
 
     /// Sums of squared residuals of measured channels and of torques asked for, each with its number of rows, at the truth.
     fn left_of(world: &World, clips: &[Clip]) -> [(f64, f64); 2] {
-        let arm = ArmClips::new(&world.cell, clips, |_: &[f64]| world.hidden.clone()).expect("an arm");
+        let arm = ArmClips::moments(&world.cell, clips, |_: &[f64]| world.hidden.clone()).expect("an arm");
         let mut sums = [(0.0, 0.0); 2];
         for clip in 0..clips.len() {
             let mut out = Vec::new();

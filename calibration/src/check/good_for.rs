@@ -1,11 +1,11 @@
 //! Which verbs each clip is good for, by the rules by which these admit clips, and what is missing for a verb.
 
 use super::remark::{Remark, Severity};
-use inference::likelihood::arm::ArmClips;
 use crate::identify::IdentifyError;
 use inference::admit::admit;
 use inference::admit::look::{for_diagnosis, for_object};
 use inference::admit::remarks::grouped;
+use inference::likelihood::arm::ArmClips;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipEntry, ClipKind};
 use shared_mem::recording::{Clip, PictureKind, ReadError, Session, for_pictures};

@@ -1,11 +1,11 @@
 //! Rows of recorded strokes: what each group of sensors tells, and that what is said without a simulation is what a simulation says.
 
 use super::test_bench::{on_strokes, shipped};
-use worlds::world::{Fault, Kind, World};
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::sweep::Precision;
 use inference::estimate::ClipModel as _;
 use inference::likelihood::{Evidence, Group, Likelihood as _, Reach};
+use worlds::world::{Fault, Kind, World};
 
 /// The largest slope in a group of a number of the baseline, by its name [sigma for 1 % of it].
 fn slope<E: Evidence>(bench: &Bench<'_, E>, name: &str, group: Group) -> f64 {

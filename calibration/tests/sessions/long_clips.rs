@@ -1,6 +1,5 @@
 //! Clips of a minute, of which the arm moves for a few seconds: what counts is where it moves, and the verdict is the same.
 
-
 use calibration::diagnose::{Kind, Options, diagnose_clips};
 use inference::admit::Admitted;
 use inference::admit::length::liveliest;

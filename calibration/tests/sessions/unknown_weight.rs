@@ -1,7 +1,6 @@
 //! Arms of which no masses are known have weight all the same: it is identified with the gains, and what it leaves at rest is not
 //! taken for a cause.
 
-
 use calibration::diagnose::{Diagnosis, Kind, Options, diagnose_clips};
 use calibration::identify::arm;
 use inference::admit::Admitted;

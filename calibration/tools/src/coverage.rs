@@ -1,10 +1,10 @@
 //! Whether the intervals that identification and diagnosis print hold the truth as often as they say: sessions of sealed
 //! worlds, every number that is printed with an interval, and how often the truth lies inside.
 
+use calibration::answer::identification::Parameter;
 use calibration::benchmark::score::Rate;
 use calibration::benchmark::trial;
 use calibration::diagnose::{self, Diagnosis, diagnose_clips};
-use calibration::answer::identification::Parameter;
 use calibration::identify::{Identification, arm, object};
 use inference::statistics;
 use serde::{Deserialize, Serialize};

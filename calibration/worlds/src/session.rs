@@ -308,8 +308,7 @@ fn effect(name: &str, parameter: &str, value: f64) -> EffectTheta {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use inference::likelihood::Likelihood as _;
-    use inference::likelihood::arm::ArmClips;
+
     use crate::world::Fault;
     use shared_mem::cell::Cell;
     use std::path::Path;

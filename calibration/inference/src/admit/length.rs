@@ -2,7 +2,6 @@
 //! candidate simulates all that counts a hundred times.
 
 use crate::likelihood::smoothing;
-use crate::likelihood::smoothing;
 use shared_mem::cell::ClipKind;
 use shared_mem::recording::{Clip, JointSeries};
 

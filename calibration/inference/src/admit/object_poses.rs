@@ -1,7 +1,6 @@
 //! Which recorded clips can be held against the twin: an object that topples, is lost by its tracker, is never hit or lies
 //! elsewhere than the tool is noticed here, mended where that is safe, and said. Base frame, SI.
 
-use crate::likelihood::object::Clearance;
 use super::mended::mended;
 use super::oddities::{oddities, rate};
 use crate::likelihood::object::Clearance;

@@ -14,8 +14,6 @@
 
 use crate::likelihood::setting::complete;
 use crate::likelihood::smoothing::{derivatives, half_width};
-use crate::likelihood::setting::complete;
-use crate::likelihood::smoothing::{derivatives, half_width};
 use nalgebra::{DMatrix, DVector};
 use shared_mem::cell::{Cell, ControllerKind, Ranges, Robot, TorqueSensing};
 use shared_mem::recording::Clip;

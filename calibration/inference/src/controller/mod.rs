@@ -13,10 +13,10 @@ pub mod start;
 
 use crate::engine::Engine;
 use crate::estimate::{ClipModel as _, Fit, Impossible, Schedule, Unknown, fit};
+use crate::interrupt::Interrupt;
 use crate::likelihood::arm::ArmClips;
 use crate::likelihood::setting::{BaseError, arm_numbers, complete};
 use crate::likelihood::{Setting, Settings};
-use crate::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;

@@ -7,10 +7,10 @@ use super::answer::Values;
 use super::fits::{Fitted, PairBench};
 use super::subjects::Subject;
 use super::turned::{Acts, Side, Turned};
-use inference::likelihood::Evidence;
-use inference::estimate::interval::{Jackknife, LEVEL};
-use inference::statistics::normal;
 use crate::words::UNBOUNDED;
+use inference::estimate::interval::{Jackknife, LEVEL};
+use inference::likelihood::Evidence;
+use inference::statistics::normal;
 use std::collections::BTreeMap;
 
 /// The parameters of a subject that each session has of its own.

@@ -8,8 +8,8 @@ use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out;
 use crate::diagnose::judge::score::{Predicted, predict};
 use crate::diagnose::judge::trial::NEARLY_ALL;
-use inference::likelihood::Evidence;
 use inference::admit::Split;
+use inference::likelihood::Evidence;
 use inference::statistics::{median, student_sigmas};
 
 /// What all fits share.

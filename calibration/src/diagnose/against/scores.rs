@@ -12,8 +12,8 @@ use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::shortlist::{Scored, chance};
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
-use inference::likelihood::Evidence;
 use inference::estimate::quadratic::{bounded_minimum, eliminate, minimum};
+use inference::likelihood::Evidence;
 use inference::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 

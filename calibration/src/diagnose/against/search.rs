@@ -8,8 +8,8 @@ use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{FIRST_PASS, HEAT};
 use crate::diagnose::fit::stages;
 use crate::diagnose::search::refit::last_pass;
-use inference::likelihood::Evidence;
 use crate::words::words;
+use inference::likelihood::Evidence;
 use shared_mem::progress::{Planned, Progress};
 
 /// At most so many changes are named, and so many effects that both sessions have are found on the way.

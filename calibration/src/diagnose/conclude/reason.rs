@@ -6,8 +6,8 @@ use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::shortlist::{BY_CHANCE, TESTABLE};
 use crate::diagnose::judge::score::Advantage;
 use crate::diagnose::judge::trial::{Found, NEARLY_ALL, PLAIN, Trial, WORTHWHILE, convincing};
-use inference::likelihood::Evidence;
 use crate::words::words;
+use inference::likelihood::Evidence;
 
 /// A candidate with all that its reason is drawn from.
 #[derive(Debug, Clone, Copy)]

@@ -8,9 +8,9 @@ use super::shortlist;
 use super::sweep::{Column, Swept};
 use crate::diagnose::library::Library;
 use inference::estimate::Impossible;
+use inference::estimate::quadratic::minimum;
 use inference::likelihood::arm::noise::correlation_length;
 use inference::likelihood::{Channel, Group, Likelihood};
-use inference::estimate::quadratic::minimum;
 use inference::statistics::median;
 use nalgebra::{DMatrix, DVector};
 

@@ -2,8 +2,8 @@
 //! linearisation around that fit knows them, so no simulation is needed.
 
 use super::bench::{Bench, Hypothesis};
-use inference::likelihood::Evidence;
 use inference::estimate::quadratic::minimum;
+use inference::likelihood::Evidence;
 use nalgebra::DMatrix;
 
 /// How far the free numbers move to the minimum of a form over (residual, free numbers), within their bounds.

@@ -6,12 +6,12 @@
 //! held and never fitted, all that is plausible is possible.
 
 use super::bench::{Bench, Hypothesis};
-use inference::likelihood::Evidence;
-use inference::likelihood::setting::Setting;
-use inference::estimate::interval::Jackknife;
-use inference::statistics::normal;
 use crate::answer::Size;
 use crate::words::UNBOUNDED;
+use inference::estimate::interval::Jackknife;
+use inference::likelihood::Evidence;
+use inference::likelihood::setting::Setting;
+use inference::statistics::normal;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};
 

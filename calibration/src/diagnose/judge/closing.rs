@@ -4,8 +4,8 @@ use super::gap::{Residuals, Typical};
 use super::remainder::Left;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use inference::likelihood::{Evidence, Group};
 use inference::admit::Split;
+use inference::likelihood::{Evidence, Group};
 
 /// A gap smaller than this, over its floor, is taken for this size.
 const LEAST_GAP: f64 = 1.2;

@@ -7,8 +7,8 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::left_out::numbers_without;
 use crate::diagnose::fit::sweep::Precision;
-use inference::likelihood::Evidence;
 use inference::admit::Split;
+use inference::likelihood::Evidence;
 
 /// Enough for a fit that begins where all clips together have it.
 const EFFORT: Effort = Effort::of(8, Precision::Joints);

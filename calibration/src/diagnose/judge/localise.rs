@@ -1,8 +1,8 @@
 //! Where the gap lies: the share of every cell of stage, channel and regime in the squared residual beyond the noise.
 
 use super::gap::Residuals;
-use inference::likelihood::{Evidence, Group};
 use crate::answer::diagnosis::Place;
+use inference::likelihood::{Evidence, Group};
 use std::collections::BTreeMap;
 
 /// Cells with less than this share are left out.

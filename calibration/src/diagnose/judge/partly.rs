@@ -16,8 +16,8 @@ use super::{confidence, remainder};
 use crate::answer::diagnosis::Share;
 
 use crate::diagnose::fit::bench::Bench;
-use inference::likelihood::Evidence;
 use inference::admit::Split;
+use inference::likelihood::Evidence;
 
 /// More than half of the squared gap: then what was found is larger than all that was not.
 const REAL_SHARE: f64 = 0.5;

@@ -7,9 +7,9 @@
 use super::held_out::Fits;
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
 use crate::diagnose::fit::left_out::shift_to;
+use inference::estimate::quadratic::value;
 use inference::likelihood::Evidence;
 use inference::likelihood::random_effects_scale::{Around, at_the_best_scale};
-use inference::estimate::quadratic::value;
 use inference::statistics::median;
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.

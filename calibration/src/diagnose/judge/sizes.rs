@@ -8,10 +8,10 @@ use crate::answer::diagnosis::{Change, Gap, SensorGap, TorqueRms};
 use crate::diagnose::DiagnoseError;
 
 use crate::diagnose::fit::bench::Bench;
-use inference::likelihood::{Evidence, setting};
-use inference::likelihood::object::Replays;
 use crate::words::in_unit;
 use inference::admit::Admitted;
+use inference::likelihood::object::Replays;
+use inference::likelihood::{Evidence, setting};
 use shared_mem::cell::Tolerance;
 use shared_mem::recording::Session;
 

@@ -8,8 +8,8 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Library;
-use inference::likelihood::Evidence;
 use inference::admit::Split;
+use inference::likelihood::Evidence;
 
 /// A new effect must be worth at least this [nats], more than twice its error, and more than its numbers cost.
 pub(in crate::diagnose) const LEAST: f64 = 4.0;

@@ -1,12 +1,11 @@
 //! All candidates' signatures around a hypothesis, and what the score test says of each.
 
-
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::{self, Scored};
 use crate::diagnose::fit::sweep::{Point, Precision, Swept, sweep};
 use crate::diagnose::fit::{floor, stages};
-use inference::likelihood::{Evidence, random_effects_scale};
 use inference::admit::Split;
+use inference::likelihood::{Evidence, random_effects_scale};
 use nalgebra::DMatrix;
 use shared_mem::progress::Progress;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -4,16 +4,15 @@
 //! and a hit elsewhere tells nothing about the gain;
 //! then the object's parameters under that arm, by the identification's own way over rough hits; then all together.
 
-
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::sweep::Precision;
 use crate::diagnose::fit::{floor, stages};
 use crate::diagnose::propose::arm_alone::ArmAlone;
 use crate::identify::object;
-use inference::likelihood::{Evidence, Likelihood};
 use inference::admit::{Admitted, Split};
 use inference::controller;
+use inference::likelihood::{Evidence, Likelihood};
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;

@@ -1,11 +1,10 @@
 //! What a search around points of another program found, fitted to that program's own roll-outs.
 
-
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::FIRST_PASS;
 use crate::diagnose::judge::trial::Found;
-use inference::likelihood::Evidence;
 use inference::admit::Split;
+use inference::likelihood::Evidence;
 
 /// A hypothesis at its best by the engine; as it is where the twin simulates, the engine has no answer, or no time is left.
 pub(super) fn by_engine<E: Evidence>(

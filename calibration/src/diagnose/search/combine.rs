@@ -18,9 +18,9 @@ use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::propose::screening::{arm_gap_is_open, overlooked, seen_at_the_least_scatter, to_fit};
 use crate::diagnose::propose::signatures;
 use crate::diagnose::propose::starts;
-use inference::likelihood::{Evidence, Group, Row};
 use crate::words::words;
 use inference::admit::Split;
+use inference::likelihood::{Evidence, Group, Row};
 use shared_mem::progress::Progress;
 
 /// At most so many effects are named.

@@ -3,12 +3,11 @@
 //! A likelihood ratio compares two maxima. Over rough hits a fit without an effect may end in another place than the fits
 //! with one, which each get a start of their own; any effect then seems to close what that place leaves.
 
-
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{FIRST_PASS, NEAR};
 use crate::diagnose::judge::trial::{CLOSES, Step};
-use inference::likelihood::Evidence;
 use inference::admit::Split;
+use inference::likelihood::Evidence;
 
 impl Step {
     /// What this step extends, from the numbers of its best trial without that trial's effect, where it fits better by more

@@ -1,13 +1,12 @@
 //! Trials that are fitted once more with the object found anew: its parameters were identified without the effect, and
 //! stand in for a part of it.
 
-
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::FIRST_PASS;
 use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::trial::{LEAST, PLAIN, Step, Trial};
-use inference::likelihood::Evidence;
 use inference::admit::Split;
+use inference::likelihood::Evidence;
 
 /// Rivals of the best that are worth this share of it are fitted again.
 const RIVAL: f64 = 0.5;

@@ -5,8 +5,8 @@ use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Figures, Identification};
 use crate::identify::error::IdentifyError;
 use crate::identify::figures::{FITTED, HELD_OUT, Odd, gap, odd};
-use inference::estimate::{Random, Schedule, Subset, score};
 use crate::identify::used::Used;
+use inference::estimate::{Random, Schedule, Subset, score};
 use rayon::prelude::*;
 
 /// Points of a picture's line (a choice: one in two pixels).

@@ -2,8 +2,8 @@
 //! there; a limit that already clips some torque has one.
 
 use super::Model;
-use inference::estimate::{ClipModel, Fit, Schedule, Subset, Unknown, fit};
 use inference::controller::start::costs;
+use inference::estimate::{ClipModel, Fit, Schedule, Subset, Unknown, fit};
 use inference::interrupt::Interrupt;
 use inference::likelihood::Setting;
 use rayon::prelude::*;

@@ -4,8 +4,8 @@ use super::Model;
 use crate::answer::identification::{Advice, NotIdentifiable};
 use crate::identify::finding::Finding;
 use crate::identify::run::Optimizer;
-use inference::likelihood::Setting;
 use crate::identify::used::Used;
+use inference::likelihood::Setting;
 
 use twin::effects::{Robot, find};
 

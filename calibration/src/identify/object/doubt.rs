@@ -1,8 +1,8 @@
 //! What speaks against trusting a fit although it looks sure of itself, one sentence each with the remedy.
 
-use inference::likelihood::object::noise_of;
 use crate::answer::identification::{ClipGap, Identification};
 use crate::identify::figures::{Odd, odd};
+use inference::likelihood::object::noise_of;
 use shared_mem::cell::Cell;
 
 /// ADD on the clips fitted, over the tracker's noise, from which on it is neither noise nor chance in the hits.

@@ -4,8 +4,8 @@ use super::Problem;
 use super::fit::ObjectFit;
 use super::material::Material;
 use crate::answer::identification::{Identification, NotIdentifiable};
-use inference::likelihood::{Setting, Settings};
 use crate::identify::finding::Finding;
+use inference::likelihood::{Setting, Settings};
 
 /// A number is not identifiable where half its interval is more than this share of its range (a choice),
 const OPEN_FROM_SHARE_OF_RANGE: f64 = 0.25;

@@ -1,13 +1,13 @@
 //! A session's clips with an object, sorted by their use.
 
 use super::Options;
-use inference::likelihood::arm::one_piece;
-use shared_mem::cell::{Cell, ClipKind};
 use crate::identify::error::IdentifyError;
 use crate::identify::used::Used;
 use inference::admit::look::for_object;
 use inference::admit::remarks::reasons;
 use inference::admit::{Looked, Usable};
+use inference::likelihood::arm::one_piece;
+use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::console;
 use shared_mem::recording::{Clip, Session};
 use twin::arm::{ArmModel, ModelError};

@@ -4,11 +4,11 @@
 //! elsewhere than simulated finds its own way first. A clip that nothing fits counts less, so that it does not steer
 //! the others.
 
-use inference::estimate::{ClipFit, Fit, Impossible, Intervals, Random, Unknown, at_bounds, without_leaning};
-use inference::likelihood::object::ObjectClips;
+use inference::estimate::interval::LEVEL;
 use inference::estimate::profile::{Profile, profiled};
 use inference::estimate::solve::{Descent, End, Problem, Quadratic, Schedule, Trial, descend};
-use inference::estimate::interval::LEVEL;
+use inference::estimate::{ClipFit, Fit, Impossible, Intervals, Random, Unknown, at_bounds, without_leaning};
+use inference::likelihood::object::ObjectClips;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
