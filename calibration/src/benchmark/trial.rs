@@ -152,8 +152,8 @@ fn said(found: &Diagnosis) -> Said {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::evidence::measured::Measured;
     use inference::estimate::ClipModel;
+    use inference::likelihood::Likelihood as _;
     use shared_mem::cell::Cell;
     use std::path::Path;
     use worlds::draw;

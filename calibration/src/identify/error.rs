@@ -3,7 +3,7 @@
 use inference::controller::ControllerError;
 use inference::engine::EngineError;
 use inference::estimate::Impossible;
-use inference::forward::setting::BaseError;
+use inference::likelihood::setting::BaseError;
 use shared_mem::output::OutputError;
 use shared_mem::recording::ReadError;
 use shared_mem::toml_file::TomlFileError;

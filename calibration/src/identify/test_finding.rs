@@ -1,8 +1,9 @@
 //! Fits of two numbers to clips that see sums of them, to try on what is said of a fit.
 
 use super::finding::Finding;
-use inference::estimate::{ClipModel, Impossible, Intervals, Options, Unknown, at_bounds, fit};
-use inference::forward::Setting;
+use inference::estimate::interval::LEVEL;
+use inference::estimate::{ClipModel, Impossible, Intervals, Schedule, Unknown, at_bounds, fit};
+use inference::likelihood::Setting;
 
 /// A clip whose rows say one sum of both numbers, which are a half each.
 #[derive(Clone, Copy)]
@@ -44,9 +45,9 @@ impl ClipModel for Sums<'_> {
 pub(super) fn found(settings: &[Setting; 2], clips: &[Seen], ask: impl FnOnce(&Finding<'_>)) {
     let unknown = |setting: &Setting| Unknown { name: setting.name(), start: 0.4, lower: 0.0, upper: 1.0, step: 1e-3 };
     let unknowns = settings.each_ref().map(unknown);
-    let fit = fit(&Sums(clips), &unknowns, &[], &Options::default(), |_, _| true).expect("an answer");
+    let fit = fit(&Sums(clips), &unknowns, &[], &Schedule::default(), |_, _| true).expect("an answer");
     let held = at_bounds(&unknowns, &fit.shared);
-    let intervals = Intervals::new(&fit, &held);
+    let intervals = Intervals::new(&fit, &held, LEVEL);
     let (settings, unknowns) = (&settings[..], &unknowns[..]);
     ask(&Finding { settings, unknowns, fit, held, intervals, simulated: 8, convergence: Vec::new(), arrived: true });
 }

@@ -5,7 +5,10 @@ mod command_line;
 #[path = "../driven/mod.rs"]
 mod driven;
 mod foreign_logs;
+#[path = "../golden/mod.rs"]
+mod golden;
 mod hand_eye;
+mod identified;
 mod identify_arm;
 mod identify_joint;
 mod keeping;

@@ -81,7 +81,6 @@ impl Contact {
 mod tests {
     use super::*;
     use twin::arm::MAX_JOINTS;
-    use worlds::world::{Fault, Kind, World};
 
     #[test]
     fn a_vertical_force_leaves_no_residual_and_a_horizontal_one_does() {

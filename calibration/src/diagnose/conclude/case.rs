@@ -2,11 +2,11 @@
 
 use crate::answer::effect_in_words;
 use crate::diagnose::Options;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use crate::diagnose::judge::trial::{Found, Step};
 use inference::admit::{Admitted, Split};
+use inference::likelihood::Evidence;
 use shared_mem::recording::Session;
 
 /// What an answer is drawn from.

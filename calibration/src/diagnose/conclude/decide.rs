@@ -5,7 +5,6 @@ use super::case::Case;
 use super::measure::Measures;
 use super::verdict::{Decision, Finding};
 use crate::answer::diagnosis::Kind;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out::Fits;
@@ -14,6 +13,7 @@ use crate::diagnose::judge::score::predict;
 use crate::diagnose::judge::trial::{Found, Step};
 use crate::diagnose::judge::{confidence, drift, remainder};
 use crate::diagnose::search::refit;
+use inference::likelihood::Evidence;
 
 /// The verdict, and what it rests on.
 pub(super) struct Decided<'a> {

@@ -3,7 +3,6 @@
 use super::case::Case;
 use crate::answer::diagnosis::{Place, SensorGap};
 use crate::diagnose::DiagnoseError;
-use crate::diagnose::evidence::measured::Evidence;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::confirm::{Confirmation, confirm};
 use crate::diagnose::judge::gap::Residuals;
@@ -11,6 +10,7 @@ use crate::diagnose::judge::held_out::{self, Fits};
 use crate::diagnose::judge::localise::localise;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes;
+use inference::likelihood::Evidence;
 
 /// A hypothesis on the confirm clips.
 pub(super) struct OnConfirm {

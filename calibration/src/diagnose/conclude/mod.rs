@@ -29,9 +29,9 @@ pub mod written;
 pub use say::not_testable;
 
 use super::DiagnoseError;
-use super::evidence::measured::Evidence;
 use crate::answer::diagnosis::Diagnosis;
 use case::Case;
+use inference::likelihood::Evidence;
 
 /// Opens the confirm clips and says what was found.
 ///

@@ -9,7 +9,6 @@ use super::{advice, ranked, remedies, verdict};
 use crate::answer::Trace;
 use crate::answer::diagnosis::{Change, Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Rest, Share, Verdict};
 use crate::diagnose::criteria::CLASS_IS_RIGHT;
-use crate::diagnose::evidence::measured::{Evidence, Group};
 use crate::diagnose::judge::ends;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out;
@@ -20,6 +19,7 @@ use crate::diagnose::judge::unproven::{Unproven, unproven};
 use crate::diagnose::{DiagnoseError, Options};
 use crate::words::{channel_in_words, words};
 use inference::admit::{Admitted, COMMANDS_TO_CHOOSE_BY, Split};
+use inference::likelihood::{Evidence, Group};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 

@@ -24,13 +24,14 @@ use super::used::Used;
 use crate::answer::identification::Identification;
 use inference::controller::{controlled, start};
 use inference::engine;
+use inference::estimate::interval::LEVEL;
 use inference::estimate::{Intervals, Random, Subset, Unknown, at_bounds};
 
 use inference::interrupt::Interrupt;
 use inference::kept;
 use inference::kept::Fingerprint;
 use inference::likelihood::arm::ArmClips;
-use inference::likelihood::setting::{BaseError, arm_numbers, complete, effect_settings};
+use inference::likelihood::setting::{arm_numbers, complete, effect_settings};
 use inference::likelihood::{Setting, Settings};
 use session::Material;
 use shared_mem::cell::Cell;
@@ -133,7 +134,7 @@ fn identify_kept(
     let open = time_step::taken_out(&mut outcome.fit, &unknowns, &error?);
     saturation::forget_unreached(&model, settings.settings(), &mut outcome.fit);
     let held = at_bounds(&unknowns, &outcome.fit.shared);
-    let mut intervals = Intervals::new(&outcome.fit, &held);
+    let mut intervals = Intervals::new(&outcome.fit, &held, LEVEL);
     intervals.half_width.iter_mut().zip(&open).for_each(|(half, open)| *half = half.hypot(*open));
     let Outcome { fit, simulated, convergence, arrived } = outcome;
     let finding = Finding {

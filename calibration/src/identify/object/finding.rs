@@ -5,7 +5,7 @@ use super::fit::ObjectFit;
 use super::material::Material;
 use crate::answer::identification::{Identification, NotIdentifiable};
 use crate::identify::finding::Finding;
-use inference::likelihood::{Setting, Settings};
+use inference::likelihood::Setting;
 
 /// A number is not identifiable where half its interval is more than this share of its range (a choice),
 const OPEN_FROM_SHARE_OF_RANGE: f64 = 0.25;

@@ -6,7 +6,6 @@ use crate::identify::used::Used;
 use inference::admit::look::for_object;
 use inference::admit::remarks::reasons;
 use inference::admit::{Looked, Usable};
-use inference::likelihood::arm::one_piece;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::console;
 use shared_mem::recording::{Clip, Session};

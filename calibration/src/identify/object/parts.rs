@@ -10,7 +10,6 @@ use crate::identify::error::IdentifyError;
 use crate::identify::run::Work;
 use inference::estimate::ClipModel as _;
 use inference::estimate::interval::LEVEL;
-use inference::likelihood::Settings;
 use inference::likelihood::object::ObjectClips;
 use inference::statistics::student;
 use shared_mem::progress::Progress;

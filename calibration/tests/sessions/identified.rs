@@ -1,12 +1,9 @@
-//! What identification says of small simulated sessions, held against what it said before (`identified.json`): values, intervals, what
+//! What identification says of small simulated sessions, held against what it said before (`identified.json` beside this file): values, intervals, what
 //! is not identifiable, how far the twin is off. Where a change is meant, the object in `target/tmp/identified/` replaces the one of its
 //! name.
 
-mod arm_session;
-mod golden;
-mod slides;
-
-use arm_session::{NOISE, cell, clips, hidden};
+use crate::arm_session::{NOISE, cell, clips, hidden};
+use crate::{golden, slides};
 use calibration::identify::{Identification, Options, arm, object};
 use inference::interrupt::Interrupt;
 use serde_json::json;
