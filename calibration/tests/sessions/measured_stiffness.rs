@@ -5,6 +5,7 @@ use inference::interrupt::Interrupt;
 use shared_mem::cell::{Cell, Ranges};
 use shared_mem::recording::Clip;
 use std::path::Path;
+use worlds::draw;
 use worlds::session::record;
 use worlds::world::{Fault, Kind, World};
 
@@ -13,7 +14,7 @@ const CLIPS: usize = 4;
 fn world(number: u64, effect: &str) -> World {
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
     let cell = Cell::read(&shipped).expect("the shipped cell");
-    let which = twin::effects::registry().iter().position(|info| info.name == effect).expect("an effect");
+    let which = draw::candidates(false).iter().position(|info| info.name == effect).expect("an effect");
     World::draw(number, Kind::Excitation, Fault::Single(which), &cell)
 }
 

@@ -4,7 +4,7 @@ use crate::remark::Remark;
 use crate::scan::{Frame, Scan, ScanError};
 use rayon::prelude::*;
 use shared_mem::ending;
-use shared_mem::statistics::{median, robust_sigma};
+use shared_mem::statistics::robust_sigma;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Every so many views one is held out.
@@ -48,7 +48,10 @@ pub(crate) fn named(frames: &[Frame]) -> String {
 /// The frames without those that have far less detail than the others.
 pub(crate) fn without_blurred(frames: Vec<Frame>, remarks: &mut Vec<Remark>) -> Vec<Frame> {
     let detail: Vec<f64> = frames.par_iter().map(detail).collect();
-    let middle = median(detail.iter().copied()).unwrap_or(0.0);
+    // The upper of two middle values, no mean of both: where half of the views are blurred, the sharp half decides.
+    let mut sorted = detail.clone();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
     let mut blurred = Vec::new();
     let mut kept = Vec::new();
     for (frame, detail) in frames.into_iter().zip(detail) {

@@ -1,7 +1,6 @@
 //! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by the steps of
 //! `descend`.
 
-use super::descend::Reached;
 use super::effort::Effort;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
@@ -50,6 +49,14 @@ impl<V> FittedClip<V> {
     pub fn deviance(&self) -> f64 {
         self.reduced.form[(0, 0)] + self.reduced.volume
     }
+}
+
+/// Where a fit of a hypothesis is.
+pub(super) struct Reached {
+    pub(super) full: Vec<f64>,
+    pub(super) clips: Clips,
+    /// Whether numbers were turned round on the way there: a vector's length is never negative.
+    pub(super) turned_round: bool,
 }
 
 /// A hypothesis with its numbers, of a bench whose clips have own numbers or have none: the other kind of bench takes its numbers

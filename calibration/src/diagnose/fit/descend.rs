@@ -4,7 +4,7 @@
 //! step takes all of them: clips then have slopes by nuisance parameters, which a step of the shared ones says nothing about, and a hit
 //! goes elsewhere with the least change of the gains.
 
-use super::bench::{Bench, Clips};
+use super::bench::{Bench, Clips, Reached};
 use super::effort::Effort;
 use super::floor;
 use super::sweep::{Precision, Swept};
@@ -16,14 +16,6 @@ use nalgebra::{DMatrix, DVector};
 /// A fit has converged when a step promises less than 0.05 of the deviance: a fiftieth of a nat decides nothing. Where more is left
 /// than the weights take for noise, chance moves more, and so much more decides nothing.
 const SCHEDULE: Schedule = Schedule { damping: 1e-4, trials: 6, iterations: 0, tolerance: 0.05, secant: Some(0.5) };
-
-/// Where a hypothesis is.
-pub(super) struct Reached {
-    pub(super) full: Vec<f64>,
-    pub(super) clips: Clips,
-    /// Whether numbers were turned round on the way there: a vector's length is never negative.
-    turned_round: bool,
-}
 
 /// A hypothesis of which some numbers move.
 struct Moving<'a, E> {
