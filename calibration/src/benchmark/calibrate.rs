@@ -177,8 +177,8 @@ impl Labelled {
 
 fn is_plain(of: &SensorGap) -> bool {
     let from = match of.sensors {
-        Sensors::Joints => criteria::PLAIN_IN_JOINTS,
-        Sensors::Object => criteria::PLAIN_IN_OBJECT,
+        Sensors::Joints => criteria::LARGE_JOINTS_EXCESS,
+        Sensors::Object => criteria::LARGE_OBJECT_EXCESS,
     };
     of.before - of.floor > from
 }

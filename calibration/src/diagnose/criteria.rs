@@ -110,7 +110,12 @@ pub const NAMED_IS_WRONG: Criterion = Criterion {
     value: 0.04,
 };
 
+/// More than this share of a gap is most of it.
+pub const MOST_OF_IT: f64 = 0.5;
+/// What comes to this share of another does about as well (a choice).
+pub const ALIKE_SHARE: f64 = 0.5;
+
 /// A gap of the joints is plain from here on [squared sigmas]: three times what a cause may leave of it.
-pub const PLAIN_IN_JOINTS: f64 = 3.0 * JOINTS_EXCESS_BESIDE_A_CAUSE.value;
+pub const LARGE_JOINTS_EXCESS: f64 = 3.0 * JOINTS_EXCESS_BESIDE_A_CAUSE.value;
 /// A gap of the object is plain from here on [squared sigmas]: three least ones.
-pub const PLAIN_IN_OBJECT: f64 = 3.0 * OBJECT_EXCESS.value;
+pub const LARGE_OBJECT_EXCESS: f64 = 3.0 * OBJECT_EXCESS.value;

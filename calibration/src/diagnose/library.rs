@@ -199,6 +199,15 @@ impl Library {
         numbers
     }
 
+    /// Numbers with some effects as others have them.
+    pub fn with_effects_of(&self, mut numbers: Vec<f64>, effects: &[usize], others: &[f64]) -> Vec<f64> {
+        for effect in effects {
+            let own = self.candidates[*effect].numbers.clone();
+            numbers[own.clone()].copy_from_slice(&others[own]);
+        }
+        numbers
+    }
+
     /// Whether the arm feels a number where the numbers are these.
     pub fn arm_feels(&self, number: usize, numbers: &[f64]) -> bool {
         match self.reaches[number] {

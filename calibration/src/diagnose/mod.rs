@@ -11,6 +11,7 @@
 //! | [`criteria`] | the measured numbers that decide |
 //! | [`library`], [`ground`], `known_gains` | the candidates as numbers; where on the table objects slid; how far gains stated by value may be off |
 //! | [`fit`] | hypotheses linearised around clips and fitted to them |
+//! | [`select`] | extensions of a model taken on while clips that were not fitted are predicted better |
 //! | [`judge`] | how well a hypothesis predicts clips, how much of the gap it closes, how sure that is, and what is left |
 //! | [`propose`] | which candidates are tried, on what, and where their fits begin |
 //! | [`search`] | from the identified baseline to the effects that act together |
@@ -29,6 +30,7 @@ mod known_gains;
 pub mod library;
 pub mod propose;
 pub mod search;
+pub mod select;
 #[cfg(test)]
 mod test_bench;
 #[cfg(test)]
@@ -287,7 +289,7 @@ fn examine<E: Evidence>(
         let step = bench.step("refined").with_numbers(full);
         trail.0.once(&step, || search::baseline::refined(&bench, &split, &session.cell, admitted, full))
     };
-    let found = search::combine::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
+    let found = search::effects::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
     let cut_short = interrupt.spent();
     bar.stage(fit::stages::CONCLUSION, 1);
     let case = Case { bench: &bench, split: &split, found: &found, session, admitted, options };

@@ -3,7 +3,7 @@
 use crate::answer::diagnosis::{Kind, Status};
 use crate::diagnose::against::change::{rows, smallest_in_words};
 use crate::diagnose::against::{Candidate, Comparison};
-use crate::diagnose::judge::confidence::MOST;
+use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 use crate::page::figure::bars::{Row, bars};
 use crate::page::frame::{facts, figure, frame, legend, next_clip, unbroken, worth_knowing};
 use crate::words::share::{limited, percent_interval, probability};
@@ -78,7 +78,7 @@ fn changes(found: &Comparison) -> Markup {
                 h2 { "What changed" }
                 @for candidate in candidates {
                     h3 { (words(&candidate.name)) }
-                    p { (limited(candidate.probability, MOST)) ": " (candidate.why) ". "
+                    p { (limited(candidate.probability, MAX_PROBABILITY)) ": " (candidate.why) ". "
                         @if !candidate.confusable_with.is_empty() {
                             "Looks like: " (candidate.confusable_with.iter().map(|name| words(name)).collect::<Vec<_>>().join(", ")) "."
                         }

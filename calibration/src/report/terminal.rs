@@ -9,13 +9,11 @@ use crate::benchmark::calibrate::Regenerated;
 use crate::benchmark::score::{Method, Scores};
 use crate::diagnose::against::change;
 use crate::diagnose::against::{Candidate as Compared, Comparison};
-use crate::diagnose::judge::confidence::MOST;
-use crate::words::channel_in_words;
+use crate::words::{channel_in_words, words};
 use crate::words::parameters::{of_joints, part};
-use crate::words::quantity::span;
-use crate::words::quantity::{Unit, short};
+use crate::words::quantity::{Unit, short, span};
 use crate::words::share::{limited, percent, percent_interval};
-use crate::words::words;
+use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 
 /// Places of the gap that are named.
 const SHOWN_PLACES: usize = 3;
@@ -111,7 +109,7 @@ pub fn comparison(found: &Comparison) -> String {
     }
     let open = |candidate: &&Compared| matches!(candidate.status, Status::Named | Status::Possible);
     for candidate in found.candidates.iter().filter(open) {
-        lines.push(format!("{}   {}", words(&candidate.name), limited(candidate.probability, MOST)));
+        lines.push(format!("{}   {}", words(&candidate.name), limited(candidate.probability, MAX_PROBABILITY)));
         let rows = candidate.parameters.iter().flat_map(|(name, values)| change::rows(&candidate.name, name, values));
         let rows = rows.map(|[number, a, b, change]| {
             vec![format!("    {number}"), format!("{a} -> {b}"), format!("change {change}")]
@@ -175,7 +173,8 @@ fn candidate(candidate: &Candidate) -> Option<(Vec<String>, Vec<String>)> {
         Status::RuledOut | Status::NotTestable => return None,
     };
     let shrink = format!("shrink {}", percent_interval(candidate.shrink.value, candidate.shrink.ci90));
-    let row = vec![words(&candidate.effect), status.to_owned(), limited(candidate.probability, MOST), shrink];
+    let row =
+        vec![words(&candidate.effect), status.to_owned(), limited(candidate.probability, MAX_PROBABILITY), shrink];
     Some((row, sizes(candidate)))
 }
 

@@ -7,13 +7,13 @@ use crate::words::quantity::{Unit, short};
 use crate::words::words;
 
 /// Most numbers that a line names one by one.
-const MOST: usize = 3;
+const MAX_LISTED: usize = 3;
 
 /// `mass 0 to 0.520 kg (change 0.52 [0.50, 0.54] kg)`; of many numbers how far they reach.
 pub fn between(name: &str, values: &Values) -> String {
     let unit = unit_of(values);
     let name = words(name);
-    if values.a.len() <= MOST {
+    if values.a.len() <= MAX_LISTED {
         let one = |k: usize| {
             format!(
                 "{} to {} (change {})",

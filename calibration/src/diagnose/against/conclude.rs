@@ -13,7 +13,9 @@ use super::turned::Side;
 use crate::answer::diagnosis::{Clips, Kind, Share, Status};
 use crate::diagnose::conclude::advice;
 use crate::diagnose::conclude::site::{Advice, Site};
+use crate::diagnose::criteria::{CLASS_IS_RIGHT, UNKNOWN_IS_RIGHT};
 use crate::diagnose::fit::bench::Hypothesis;
+use crate::diagnose::judge::confidence::{MAX_PROBABILITY, TEMPERATURE_NATS};
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::localise;
 use crate::diagnose::judge::remainder::Left;
@@ -23,14 +25,8 @@ use inference::likelihood::Setting;
 use shared_mem::recording::Session;
 use std::collections::BTreeMap;
 
-/// Likelihoods count less than they say: twins are never exact.
-const TEMPERATURE: f64 = 4.0;
-/// What is kept for causes outside of the library, and how sure a class and an open gap are, as for one session.
-const MOST: f64 = 0.96;
-const CLASS: f64 = 0.9;
-const OPEN: f64 = 0.7;
 /// B deviates where it leaves more than this many times what A leaves under its own model.
-const MORE_THAN_A: f64 = 2.0;
+const MIN_TIMES_OF_A: f64 = 2.0;
 
 /// What a conclusion is drawn from.
 pub(super) struct Case<'a> {
@@ -55,14 +51,14 @@ pub(super) fn conclude<E: Evidence>(
     options: &Options,
 ) -> Result<Comparison, DiagnoseError> {
     let (found, session) = (case.found, case.sessions[1]);
-    let held_out = pair_bench.held_out(&found.last, &found.weights).ok_or(DiagnoseError::NoBaseline)?;
+    let held_out = pair_bench.held_out(&found.last.fitted, &found.weights).ok_or(DiagnoseError::NoBaseline)?;
     let with = Residuals::of(pair_bench.bench, &held_out).ok_or(DiagnoseError::NoBaseline)?;
     let under_a: Vec<_> = held_out.iter().map(|(_, clips)| (numbers(case.of_a.full.clone()), clips.clone())).collect();
     let before = Residuals::of(pair_bench.bench, &under_a).ok_or(DiagnoseError::NoBaseline)?;
     let shrink = with.shrink(&before, options.seed);
     let rivals = rivals(pair_bench, case);
     let deviates = deviates(pair_bench, case);
-    let kind = match (found.changed.is_empty() || shrink.value <= 0.0, rivals.is_empty()) {
+    let kind = match (found.last.changed.is_empty() || shrink.value <= 0.0, rivals.is_empty()) {
         (true, _) if deviates.is_some() => Kind::Unexplained,
         (true, _) => Kind::None,
         (false, true) => Kind::Named,
@@ -82,7 +78,7 @@ pub(super) fn conclude<E: Evidence>(
     let site = Site::of(session, options.report.as_deref());
     let next = if kind == Kind::Class { advice::separating(&names, &site) } else { Advice::default() };
     let files = |set: &[usize]| set.iter().map(|clip| case.pair.admitted.files[*clip].clone()).collect();
-    let in_b = if believed { found.last.model.of(Side::B) } else { found.without.model.of(Side::B) };
+    let in_b = if believed { found.last.fitted.model.of(Side::B) } else { found.without.model.of(Side::B) };
     Ok(Comparison {
         verdict: Verdict { kind, changes, confidence: confidence(kind, &candidates), text },
         gap,
@@ -124,17 +120,17 @@ fn deviates<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Opti
     let a = pair_bench.left(&case.of_a.full, &of_a)?;
     let groups = Left::of_groups(&b.typical(), &a.typical());
     let more = groups.iter().filter(|left| left.gaps() > 1.0).map(|left| left.before / left.after);
-    more.filter(|times| *times > MORE_THAN_A).max_by(f64::total_cmp)
+    more.filter(|times| *times > MIN_TIMES_OF_A).max_by(f64::total_cmp)
 }
 
 /// Subjects that do as well as one that changed, beside all the others that did.
 fn rivals<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<usize> {
     let found = case.found;
     let mut rivals = Vec::new();
-    for step in found.steps.iter().filter(|step| step.added.is_some_and(|added| found.changed.contains(&added))) {
-        let others = step.rivals(pair_bench).into_iter().filter(|trial| !found.changed.contains(&trial.subject));
+    for step in found.steps.iter().filter(|step| step.added.is_some_and(|added| found.last.changed.contains(&added))) {
+        let others = step.rivals(pair_bench).into_iter().filter(|trial| !found.last.changed.contains(&trial.subject));
         let alike = others
-            .filter(|trial| found.changed.len() == 1 || found.stands_in(pair_bench, case.subjects, (step, trial)));
+            .filter(|trial| found.last.changed.len() == 1 || found.stands_in(pair_bench, case.subjects, (step, trial)));
         rivals.extend(alike.map(|trial| trial.subject));
     }
     rivals.sort_unstable();
@@ -143,15 +139,15 @@ fn rivals<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<us
 }
 
 fn named(case: &Case<'_>, rivals: &[usize]) -> Vec<String> {
-    case.found.changed.iter().chain(rivals).map(|subject| case.subjects[*subject].name.clone()).collect()
+    case.found.last.changed.iter().chain(rivals).map(|subject| case.subjects[*subject].name.clone()).collect()
 }
 
 /// Effects that act in both sessions alike.
 fn shared<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<String> {
-    let (library, model) = (pair_bench.bench.library, &case.found.last.model);
+    let (library, model) = (pair_bench.bench.library, &case.found.last.fitted.model);
     let acts = |subject: &&Subject| {
         let rests = |k: &usize| model.of(Side::A)[*k] == library.unknowns[*k].start;
-        let changed = case.found.changed.iter().any(|changed| case.subjects[*changed].name == subject.name);
+        let changed = case.found.last.changed.iter().any(|changed| case.subjects[*changed].name == subject.name);
         subject.effect.is_some() && !changed && !subject.sizes.iter().all(rests)
     };
     case.subjects.iter().filter(acts).map(|subject| subject.name.clone()).collect()
@@ -167,9 +163,9 @@ fn candidates<E: Evidence>(
     let (found, first) = (case.found, &case.found.steps[0]);
     let likely = probabilities(&found.steps);
     let one = |(index, subject): (usize, &Subject)| {
-        let changed = found.changed.contains(&index) && matches!(kind, Kind::Named | Kind::Class);
+        let changed = found.last.changed.contains(&index) && matches!(kind, Kind::Named | Kind::Class);
         let trial = found.steps.iter().rev().find_map(|step| step.trials.iter().find(|trial| trial.subject == index));
-        let fitted = if changed { Some(&found.last) } else { trial.map(|trial| &trial.fitted) };
+        let fitted = if changed { Some(&found.last.fitted) } else { trial.map(|trial| &trial.fitted) };
         let with = fitted
             .filter(|_| changed || rivals.contains(&index))
             .and_then(|fitted| Residuals::of(pair_bench.bench, &pair_bench.held_out(fitted, &found.weights)?));
@@ -222,10 +218,10 @@ fn probabilities(steps: &[Step]) -> BTreeMap<usize, f64> {
     for step in steps {
         let proven: Vec<&Trial> = step.proven().collect();
         let best = proven.iter().map(|trial| trial.whole.nats).fold(0.0, f64::max);
-        let weight = |nats: f64| ((nats - best) / TEMPERATURE).exp();
+        let weight = |nats: f64| ((nats - best) / TEMPERATURE_NATS).exp();
         let total: f64 = proven.iter().map(|trial| weight(trial.whole.nats)).sum::<f64>() + weight(0.0);
         for trial in proven {
-            let probability = MOST * weight(trial.whole.nats) / total;
+            let probability = MAX_PROBABILITY * weight(trial.whole.nats) / total;
             all.entry(trial.subject)
                 .and_modify(|known: &mut f64| *known = known.max(probability))
                 .or_insert(probability);
@@ -237,10 +233,10 @@ fn probabilities(steps: &[Step]) -> BTreeMap<usize, f64> {
 fn confidence(kind: Kind, candidates: &[Candidate]) -> f64 {
     let named = candidates.iter().filter(|candidate| candidate.status == Status::Named);
     match kind {
-        Kind::Named => named.map(|candidate| candidate.probability).fold(MOST, f64::min),
-        Kind::None => MOST,
-        Kind::Class => CLASS,
-        Kind::Unexplained => OPEN,
+        Kind::Named => named.map(|candidate| candidate.probability).fold(MAX_PROBABILITY, f64::min),
+        Kind::None => MAX_PROBABILITY,
+        Kind::Class => CLASS_IS_RIGHT.value,
+        Kind::Unexplained => UNKNOWN_IS_RIGHT.value,
         Kind::NotTestable => 1.0,
     }
 }
@@ -262,7 +258,7 @@ fn smallest<E: Evidence>(pair_bench: &PairBench<'_, E>, score: &Score) -> BTreeM
     all
 }
 
-/// Whether a change as large as what is met in practice would have been seen in any of its numbers.
+/// Whether a change of a plausible size would have been seen in any of its numbers.
 fn could_be_seen<E: Evidence>(pair_bench: &PairBench<'_, E>, score: &Score) -> bool {
     let library = pair_bench.bench.library;
     score.sigma.iter().any(|(number, sigma)| {

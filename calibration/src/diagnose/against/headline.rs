@@ -23,7 +23,7 @@ pub(super) struct Facts {
 }
 
 /// So many of the smallest changes are said in the sentence.
-const SAID: usize = 4;
+const MAX_SMALLEST_SAID: usize = 4;
 
 impl Facts {
     /// Of what was found.
@@ -37,7 +37,7 @@ impl Facts {
         let (changes, rivals): (Vec<&Candidate>, Vec<&Candidate>) =
             open.iter().partition(|candidate| fitted(candidate));
         let seen = candidates.iter().filter(|candidate| candidate.status == Status::RuledOut);
-        let seen = seen.filter_map(said_smallest).take(SAID).collect();
+        let seen = seen.filter_map(said_smallest).take(MAX_SMALLEST_SAID).collect();
         let [low, high] = shrink.ci90.map(percent);
         Self {
             changes: changes.into_iter().map(change).collect(),
@@ -71,7 +71,7 @@ pub(super) fn sentence(kind: Kind, facts: &Facts) -> String {
             facts.times, facts.place
         ),
         Kind::None | Kind::NotTestable if facts.seen.is_empty() => {
-            "Nothing changed that these clips show, and no change of any candidate within what is met in practice would have been seen.".into()
+            "Nothing changed that these clips show, and no change of any candidate of a plausible size would have been seen.".into()
         }
         Kind::None | Kind::NotTestable => format!(
             "Nothing changed that these clips show; in nine of ten such sessions a change of this size would have been seen: {}.",
@@ -104,7 +104,7 @@ pub(super) fn reason(status: Status, slopes: Option<(f64, f64)>, trial: Option<&
     });
     match (status, gained, slopes) {
         (Status::Named | Status::Possible, Some(gained), _) => gained,
-        (Status::NotTestable, ..) => "no change within what is met in practice would have been seen".into(),
+        (Status::NotTestable, ..) => "no change of a plausible size would have been seen".into(),
         (_, Some(gained), _) => format!("{gained}: chance, or another change does better"),
         (_, None, Some((p, _))) if p < 0.05 => "its slopes explain far less than those of others".into(),
         (_, None, Some((p, _))) => format!("its slopes explain no more than chance does (p = {p:.2})"),

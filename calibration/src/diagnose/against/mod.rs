@@ -40,7 +40,7 @@ use crate::diagnose::fit::stages;
 use crate::diagnose::ground::Ground;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::remainder::Left;
-use crate::diagnose::search::{baseline, combine};
+use crate::diagnose::search::{baseline, effects};
 use fits::PairBench;
 use inference::admit::{COMMANDS_TO_CHOOSE_BY, Refused, Split, torques};
 use inference::interrupt::Interrupt;
@@ -171,7 +171,7 @@ fn examine<E: Evidence>(
     let on_a = if is_explained(&bench, &of_a, &begun) {
         begun
     } else {
-        combine::search(&bench, &of_a, begun, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?.last
+        effects::search(&bench, &of_a, begun, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?.last
     };
     let pair_bench = PairBench { bench: &bench, first_of_b: pair.first_of_b, split: &split };
     let subjects = subjects::all(library);
@@ -184,11 +184,11 @@ fn examine<E: Evidence>(
 /// Whether the parameters alone leave of A so little beyond the noise that an effect has nothing to explain.
 fn is_explained<E: Evidence>(bench: &Bench<'_, E>, of_a: &Split, baseline: &Hypothesis) -> bool {
     let Some(left) = Residuals::at(bench, baseline, &of_a.open()) else { return false };
-    Left::of_groups(&left.typical(), &left.typical()).iter().all(|left| left.gaps() < LITTLE)
+    Left::of_groups(&left.typical(), &left.typical()).iter().all(|left| left.gaps() < MAX_GAPS_OF_NOTHING)
 }
 
 /// So much of the least gap is none: engines that integrate in other steps differ by less.
-const LITTLE: f64 = 0.25;
+const MAX_GAPS_OF_NOTHING: f64 = 0.25;
 
 /// Which clips of both are for what: as of one session where each has enough commands; else each command of A is left out in
 /// turn, together with one of B.

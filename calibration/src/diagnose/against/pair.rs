@@ -101,7 +101,7 @@ fn difference(a: &Cell, b: &Cell) -> Option<(&'static str, String)> {
             return Some(("robot", format!("the joints are {} and {}", names(one), names(other))));
         }
         let ready = *one.ready();
-        let differs = |x: f64, y: f64| (x - y).abs() > SAME * x.abs().max(y.abs()).max(1.0);
+        let differs = |x: f64, y: f64| (x - y).abs() > MAX_GRAVITY_DIFFERENCE * x.abs().max(y.abs()).max(1.0);
         if one.gravity(&ready).iter().zip(other.gravity(&ready)).any(|(x, y)| differs(*x, y)) {
             return Some(("robot", "the models weigh the joints differently".into()));
         }
@@ -119,7 +119,7 @@ fn difference(a: &Cell, b: &Cell) -> Option<(&'static str, String)> {
 }
 
 /// Torques of gravity that differ by less than this share are those of one robot.
-const SAME: f64 = 1e-3;
+const MAX_GRAVITY_DIFFERENCE: f64 = 1e-3;
 
 /// What is stated otherwise in the second cell.toml, and does not count.
 fn remarks([a, b]: [&Cell; 2]) -> Vec<String> {

@@ -6,14 +6,15 @@
 //! everything that is shared at its best.
 
 use super::super::library::Library;
+use super::fits::PairBench;
 use super::subjects::Subject;
 use super::turned::{Acts, Model, SIDES, Side, side_of};
-use crate::diagnose::fit::bench::Bench;
-use crate::diagnose::fit::floor;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::{Scored, chance};
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use inference::estimate::quadratic::{bounded_minimum, eliminate, minimum};
 use inference::likelihood::Evidence;
+use crate::diagnose::propose::signatures::weights;
 use inference::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 
@@ -50,13 +51,14 @@ pub(super) struct Slopes {
 type Place = [Option<usize>; 2];
 
 impl Slopes {
-    /// Around a model, on these clips; `None` where the twin has no answer, or the time is over.
+    /// Around a model that was fitted; `None` where the twin has no answer, or the time is over.
     pub(super) fn around<E: Evidence>(
-        bench: &Bench<'_, E>,
+        pair_bench: &PairBench<'_, E>,
         model: &Model,
-        (clips, first_of_b): (&[(usize, Vec<f64>)], usize),
+        fitted: &Hypothesis,
         known_weights: Option<&[f64]>,
     ) -> Option<Self> {
+        let bench = pair_bench.bench;
         let one = |side: Side| {
             let mut free: Vec<usize> =
                 model.turned.iter().filter(|turned| turned.acts.on(side)).map(|turned| turned.number).collect();
@@ -65,13 +67,15 @@ impl Slopes {
             let is_in = |numbers: &[usize]| numbers.iter().any(|number| free.contains(number));
             let probed: Vec<usize> =
                 candidates.filter(|(_, info)| !is_in(&info.turned)).map(|(candidate, _)| candidate).collect();
-            let clips: Vec<_> = clips.iter().filter(|(clip, _)| side_of(*clip, first_of_b) == side).cloned().collect();
+            let train = pair_bench.split.train.iter().filter(|clip| side_of(**clip, pair_bench.first_of_b) == side);
+            let clips: Vec<_> = train.map(|clip| (*clip, fitted.own(*clip, bench.scatter.count()))).collect();
             let (full, free) = (model.of(side), &free[..]);
             let point = Point { full, free, probed: &probed, clips: &clips, precision: Precision::Joints };
             sweep(bench.evidence, bench.library, &point, &bench.scatter, &|_| !bench.interrupt.asked()).ok()
         };
         let swept = [one(Side::A)?, one(Side::B)?];
-        let weights = known_weights.map_or_else(|| weights(bench, &swept), |known| Some(known.to_vec()))?;
+        let weights =
+            known_weights.map_or_else(|| weights(bench, &[&swept[0], &swept[1]]), |known| Some(known.to_vec()))?;
         let clips = |swept: &Swept| -> Option<Vec<DMatrix<f64>>> {
             let reduced = swept.reduced(bench.evidence, &weights).ok()?;
             Some(reduced.into_iter().map(|clip| clip.form).collect())
@@ -97,7 +101,7 @@ impl Slopes {
         let count = others.len();
         let mut inner = form.view((1, 1), (count, count)).into_owned();
         for (k, held) in held.iter().enumerate() {
-            inner[(k, k)] += held + RIDGE * inner[(k, k)] + f64::MIN_POSITIVE.sqrt();
+            inner[(k, k)] += held + RELATIVE_RIDGE * inner[(k, k)] + f64::MIN_POSITIVE.sqrt();
         }
         let Some(inner) = inner.cholesky() else { return f64::INFINITY };
         // Residual and column with what the others imitate taken out.
@@ -124,7 +128,7 @@ impl Slopes {
 }
 
 /// Relative ridge: columns that say the same to this many digits are one.
-const RIDGE: f64 = 1e-9;
+const RELATIVE_RIDGE: f64 = 1e-9;
 
 /// The form over the residual and columns, of those sessions that are given.
 fn over(forms: [Option<&DMatrix<f64>>; 2], columns: &[Place]) -> DMatrix<f64> {
@@ -288,18 +292,6 @@ fn same_in_both(form: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
 fn pointed(candidate: usize, alternative: usize, units: &[f64]) -> Scored {
     let (units, next) = (units.to_vec(), Vec::new());
     Scored { candidate, alternative, units, next, gain: 0.0, cost: 0, cosine: 0.0, signal: 0.0, imitated: 0.0, p: 1.0 }
-}
-
-/// Factors on the channels under which what the richest model leaves in both sessions looks like noise.
-fn weights<E: Evidence>(bench: &Bench<'_, E>, swept: &[Swept; 2]) -> Option<Vec<f64>> {
-    let mut weights = vec![1.0; bench.evidence.channels().len()];
-    // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
-    for _ in 0..2 {
-        let left = |swept: &Swept| floor::richest_residuals(swept, bench.evidence, bench.library, &weights).ok();
-        let left = [left(&swept[0])?, left(&swept[1])?].concat();
-        weights = floor::weights(bench.evidence, &left);
-    }
-    Some(weights)
 }
 
 #[cfg(test)]

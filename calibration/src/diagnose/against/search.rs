@@ -1,37 +1,33 @@
 //! What changed: changes are added while the clips of both sessions are predicted better with them than with the same thing in both.
 
-use super::fits::{Fitted, LEAST, PairBench, Worth};
+use super::fits::{Fitted, PairBench};
 use super::scores::{Score, Slopes, is_apart};
 use super::subjects::Subject;
 use super::turned::Model;
 use crate::diagnose::fit::bench::Hypothesis;
-use crate::diagnose::fit::effort::{FIRST_PASS, HEAT};
+use crate::diagnose::fit::effort::{REFINEMENT, SCREENING};
 use crate::diagnose::fit::stages;
 use crate::diagnose::search::refit::last_pass;
 use crate::words::words;
 use inference::likelihood::Evidence;
+use crate::diagnose::select::criteria::CHANGES;
+use crate::diagnose::select::forward::{Selection, backward, forward};
+use crate::diagnose::select::gain::Gain;
+use crate::diagnose::select::multi_start::{Fit, cheapest};
 use shared_mem::progress::{Planned, Progress};
 
-/// At most so many changes are named, and so many effects that both sessions have are found on the way.
-const MOST: usize = 3;
-const MOST_SHARED: usize = 2;
-/// So many changes are fitted in each step.
-const FITTED: usize = 6;
-/// Those are fitted whose gain chance does not reach with this probability, and that promise this share of the best.
-const BY_CHANCE: f64 = 0.05;
-const CLOSE: f64 = 0.05;
+/// At most so many effects that both sessions have are found on the way.
+const MAX_SHARED_EFFECTS: usize = 2;
 /// An effect in both sessions that promises less than this is not fitted [deviance].
-const SHARED_GAIN: f64 = 6.0;
-/// Two changes whose log-likelihoods differ by less than this are not distinguishable [nats].
-const ALIKE: f64 = 4.0;
+const MIN_SHARED_GAIN: f64 = 6.0;
 
 /// The stages of the search, for the bar.
 const SLOPES: &str = "slopes of both sessions";
 /// See [`SLOPES`].
-const CHANGES: &str = "changes";
+const FITS: &str = "changes";
 /// With about how long each takes beside those of a diagnosis: a search that finds one change.
 pub(super) const STAGES: [Planned; 5] =
-    [(SLOPES, 1.0), (CHANGES, 2.0), (SLOPES, 1.0), (CHANGES, 1.0), (stages::CONCLUSION, 0.2)];
+    [(SLOPES, 1.0), (FITS, 2.0), (SLOPES, 1.0), (FITS, 1.0), (stages::CONCLUSION, 0.2)];
 
 /// A change that was fitted.
 #[derive(Debug, Clone)]
@@ -40,22 +36,37 @@ pub(super) struct Trial {
     pub(super) subject: usize,
     pub(super) fitted: Fitted,
     /// What it is worth over the same thing in both sessions.
-    pub(super) change: Worth,
+    pub(super) change: Gain,
     /// What it is worth over the model without.
-    pub(super) whole: Worth,
-    /// Numbers that it costs.
+    pub(super) whole: Gain,
+    /// Parameters that it costs.
     pub(super) cost: usize,
 }
 
 impl Trial {
-    /// What it is worth less what its numbers gain by chance.
     fn net(&self) -> f64 {
-        self.whole.nats - 0.5 * self.cost as f64
+        self.whole.net(self.cost)
     }
+
+    fn is_proven(&self) -> bool {
+        CHANGES.proves(&self.change, self.cost) && CHANGES.proves(&self.whole, self.cost)
+    }
+}
+
+/// A model of both sessions with what was added to that of A.
+#[derive(Debug, Clone)]
+pub(super) struct Extended {
+    pub(super) fitted: Fitted,
+    /// Subjects that changed, in the order in which they were found.
+    pub(super) changed: Vec<usize>,
+    /// How many effects both sessions have beside those that were found in A alone.
+    shared: usize,
 }
 
 #[derive(Debug, Clone)]
 pub(super) struct Step {
+    /// What is extended.
+    from: Extended,
     /// What the slopes say of every subject that has not changed, the most promising first.
     pub(super) scores: Vec<Score>,
     /// Those that were fitted.
@@ -72,11 +83,20 @@ pub(super) struct Found {
     /// The model of both without any change.
     pub(super) without: Fitted,
     /// ... with all that was found.
-    pub(super) last: Fitted,
-    /// Subjects that changed, in the order in which they were found.
-    pub(super) changed: Vec<usize>,
+    pub(super) last: Extended,
     /// Factors on the channels.
     pub(super) weights: Vec<f64>,
+}
+
+/// What may be added to a model of both sessions.
+struct Changes<'a, E> {
+    pair_bench: &'a PairBench<'a, E>,
+    subjects: &'a [Subject],
+    weights: Vec<f64>,
+    /// What the slopes around A's own model say: they show a change as it is; those around a mean of both sessions show half of it
+    /// either way.
+    around_a: Vec<Score>,
+    bar: &'a Progress,
 }
 
 /// Searches from a hypothesis that was found on A alone. `None` where the twin has no answer, or the time is over.
@@ -88,107 +108,139 @@ pub(super) fn search<E: Evidence>(
 ) -> Option<Found> {
     let start = Model::shared(of_a.full.clone(), &of_a.free);
     bar.stage(SLOPES, 1);
-    let slopes = Slopes::around(pair_bench.bench, &start, (&at(pair_bench, of_a), pair_bench.first_of_b), None)?;
-    let weights = slopes.weights.clone();
-    let mut now = pair_bench.fit(start.clone(), &weights, None, last_pass(pair_bench.bench))?;
-    let mut without = now.clone();
-    let (mut steps, mut changed, mut shared): (Vec<Step>, Vec<usize>, usize) = (Vec::new(), Vec::new(), 0);
-    // Slopes around A's own numbers show a change as it is; those around a mean of both sessions show half of it either way.
-    let mut scores = slopes.scores(pair_bench.bench, &start, subjects);
-    loop {
-        let mut step = Step { scores, trials: Vec::new(), added: None };
-        let in_both = step.fit(pair_bench, subjects, (&now, &weights), bar)?;
-        let best = step.best().map(|trial| (trial.subject, trial.fitted.clone(), trial.net()));
-        let ahead = best.as_ref().map_or(0.0, |(_, _, net)| *net);
-        let more = in_both.filter(|(_, net)| *net > ahead && shared < MOST_SHARED);
-        if let Some((fitted, _)) = more {
-            shared += 1;
-            now = fitted;
-            if changed.is_empty() {
-                without = now.clone();
-            }
-        } else if let Some((subject, fitted, _)) = best.filter(|_| changed.len() < MOST) {
-            now = pair_bench
-                .fit(fitted.model.clone(), &weights, Some(&fitted), last_pass(pair_bench.bench))
-                .unwrap_or(fitted);
-            changed.push(subject);
-            step.added = Some(subject);
-        } else {
-            steps.push(step);
-            break;
-        }
-        steps.push(step);
-        bar.stage(SLOPES, 1);
-        let slopes = Slopes::around(
-            pair_bench.bench,
-            &now.model,
-            (&at(pair_bench, &now.hypothesis), pair_bench.first_of_b),
-            Some(&weights),
-        )?;
-        scores = slopes.scores(pair_bench.bench, &now.model, subjects);
-    }
-    let (last, changed) = without_superfluous(pair_bench, subjects, (now, changed), &weights);
-    Some(Found { steps, without, last, changed, weights })
+    let slopes = Slopes::around(pair_bench, &start, of_a, None)?;
+    let around_a = slopes.scores(pair_bench.bench, &start, subjects);
+    let changes = Changes { pair_bench, subjects, weights: slopes.weights, around_a, bar };
+    let begin = changes.fitted(start, None)?;
+    let selected = forward(&changes, Extended { fitted: begin, changed: Vec::new(), shared: 0 })?;
+    let without = selected.steps.iter().rfind(|step| step.from.changed.is_empty())?.from.fitted.clone();
+    let last = backward(selected.last, |now| changes.fewer(now));
+    Some(Found { steps: selected.steps, without, last, weights: changes.weights })
 }
 
-/// Clips that are fitted, each with its own numbers.
-fn at<E: Evidence>(pair_bench: &PairBench<'_, E>, hypothesis: &Hypothesis) -> Vec<(usize, Vec<f64>)> {
-    let count = pair_bench.bench.scatter.count();
-    pair_bench.split.train.iter().map(|clip| (*clip, hypothesis.own(*clip, count))).collect()
+impl<E: Evidence> Selection for Changes<'_, E> {
+    type Model = Extended;
+    type Step = Step;
+
+    fn step(&self, now: &Extended, before: &[Step]) -> Option<(Step, Option<Extended>)> {
+        let scores = if before.is_empty() { self.around_a.clone() } else { self.scores(&now.fitted)? };
+        let promising: Vec<&Score> = CHANGES.promising(&scores, |score| (score.p, score.gain)).collect();
+        self.bar.stage(FITS, promising.len() as u64);
+        let (mut trials, mut shared) = (Vec::new(), Vec::new());
+        for (done, score) in promising.into_iter().enumerate() {
+            self.bar.show(done as u64, &stages::of(FITS, &self.subjects[score.subject].name));
+            if self.pair_bench.bench.interrupt.asked() {
+                return None;
+            }
+            let Some((trial, in_both)) = self.tried(&now.fitted, score) else { continue };
+            trials.push(trial);
+            shared.extend(in_both);
+        }
+        let step = Step { from: now.clone(), scores, trials, added: None };
+        Some(self.extended(step, shared))
+    }
+
+    fn extends(step: &Step) -> &Extended {
+        &step.from
+    }
+}
+
+/// An effect that both sessions have, fitted, and what it is worth less what its parameters gain by chance [nats].
+type Shared = (Fitted, f64);
+
+impl<E: Evidence> Changes<'_, E> {
+    fn fitted(&self, model: Model, near: Option<&Fitted>) -> Option<Fitted> {
+        self.pair_bench.fit(model, &self.weights, near, last_pass(self.pair_bench.bench))
+    }
+
+    /// What the slopes around a model say.
+    fn scores(&self, now: &Fitted) -> Option<Vec<Score>> {
+        self.bar.stage(SLOPES, 1);
+        let slopes = Slopes::around(self.pair_bench, &now.model, &now.hypothesis, Some(&self.weights))?;
+        Some(slopes.scores(self.pair_bench.bench, &now.model, self.subjects))
+    }
+
+    /// A change fitted; with the same effect in both sessions where that is worth it by itself.
+    fn tried(&self, now: &Fitted, score: &Score) -> Option<(Trial, Option<Shared>)> {
+        let subject = &self.subjects[score.subject];
+        let known = subject.is_in(|k| now.model.turned.iter().any(|turned| turned.number == k));
+        let same = if known || score.gain_shared < MIN_SHARED_GAIN {
+            None
+        } else {
+            self.fit_from([placed(&now.model, subject, &score.starts[1]).with(&subject.turned)], now)
+        };
+        let over = same.as_ref().unwrap_or(now);
+        let parted = subject.parted(known);
+        let split =
+            |model: Model| if known { model.apart(&parted) } else { model.with(&subject.turned).apart(&parted) };
+        let starts = [placed(&now.model, subject, &score.starts[0]), over.model.clone()];
+        let fitted = self.fit_from(starts.map(split), over)?;
+        let (change, whole) = (self.pair_bench.gain(&fitted, over), self.pair_bench.gain(&fitted, now));
+        let of_both = subject.turned.len();
+        let cost = if known { parted.len() } else { of_both + parted.len() };
+        let shared = same.and_then(|same| {
+            let gain = self.pair_bench.gain(&same, now);
+            CHANGES.proves(&gain, of_both).then(|| (same, gain.net(of_both)))
+        });
+        Some((Trial { subject: score.subject, fitted, change, whole, cost }, shared))
+    }
+
+    /// A fit from the first of several starts from which it comes to more than the model `near` it.
+    fn fit_from(&self, starts: impl IntoIterator<Item = Model>, near: &Fitted) -> Option<Fitted> {
+        let fit = |model, near: &Fitted, effort| self.pair_bench.fit(model, &self.weights, Some(near), effort);
+        let begun = starts.into_iter().filter_map(|start| fit(start, near, SCREENING));
+        let best = cheapest(begun, near.cost())?;
+        fit(best.model.clone(), &best, REFINEMENT)
+    }
+
+    /// The model with what is worth most: the best change, or an effect that both sessions have where one is worth more.
+    fn extended(&self, step: Step, shared: Vec<Shared>) -> (Step, Option<Extended>) {
+        let best = step.best().map(|trial| (trial.subject, trial.fitted.clone(), trial.net()));
+        let ahead = best.as_ref().map_or(0.0, |(_, _, net)| *net);
+        let from = &step.from;
+        // The first of those that are worth the same.
+        let in_both = shared.into_iter().rev().max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((fitted, _)) = in_both.filter(|(_, net)| *net > ahead && from.shared < MAX_SHARED_EFFECTS) {
+            let extended = Extended { fitted, changed: from.changed.clone(), shared: from.shared + 1 };
+            return (step, Some(extended));
+        }
+        let Some((subject, fitted, _)) = best.filter(|_| from.changed.len() < CHANGES.max_extensions) else {
+            return (step, None);
+        };
+        let fitted = self.fitted(fitted.model.clone(), Some(&fitted)).unwrap_or(fitted);
+        let extended = Extended { fitted, changed: [&from.changed[..], &[subject]].concat(), shared: from.shared };
+        (Step { added: Some(subject), ..step }, Some(extended))
+    }
+
+    /// The model without the first of its changes that the others make superfluous.
+    fn fewer(&self, now: &Extended) -> Option<Extended> {
+        let all = now.changed.len();
+        (0..all).filter(|_| all > 1).find_map(|place| self.without(now, place))
+    }
+
+    /// The model without one of its changes, where that predicts clips as well.
+    fn without(&self, now: &Extended, place: usize) -> Option<Extended> {
+        if self.pair_bench.bench.interrupt.asked() {
+            return None;
+        }
+        let model = &now.fitted.model;
+        let numbers = own(model, &self.subjects[now.changed[place]]);
+        let fitted = self.fitted(model.clone().together(&numbers), Some(&now.fitted))?;
+        let loss = self.pair_bench.gain(&now.fitted, &fitted);
+        let changed = [&now.changed[..place], &now.changed[place + 1..]].concat();
+        (!CHANGES.proves(&loss, numbers.len())).then_some(Extended { fitted, changed, shared: now.shared })
+    }
+}
+
+/// The numbers of a subject of which each session has its own.
+fn own(model: &Model, subject: &Subject) -> Vec<usize> {
+    subject.numbers.clone().filter(|k| is_apart(model, *k)).collect()
 }
 
 impl Step {
-    /// Fits the changes that promise most; the best effect that both sessions have instead, where one is worth it, with its
-    /// worth. `None` when the time is over.
-    fn fit<E: Evidence>(
-        &mut self,
-        pair_bench: &PairBench<'_, E>,
-        subjects: &[Subject],
-        (now, weights): (&Fitted, &[f64]),
-        bar: &Progress,
-    ) -> Option<Option<(Fitted, f64)>> {
-        let best = self.scores.iter().map(|score| score.gain).fold(0.0, f64::max);
-        let promising = |score: &&Score| score.p < BY_CHANCE && score.gain > CLOSE * best;
-        let wanted: Vec<Score> = self.scores.iter().filter(promising).take(FITTED).cloned().collect();
-        bar.stage(CHANGES, wanted.len() as u64);
-        let mut in_both: Option<(Fitted, f64)> = None;
-        for (done, score) in wanted.iter().enumerate() {
-            let subject = &subjects[score.subject];
-            bar.show(done as u64, &format!("{CHANGES}: {}", words(&subject.name)));
-            if pair_bench.bench.interrupt.asked() {
-                return None;
-            }
-            let known = subject.is_in(|k| now.model.turned.iter().any(|turned| turned.number == k));
-            let same = if known || score.gain_shared < SHARED_GAIN {
-                None
-            } else {
-                let model = placed(&now.model, subject, &score.starts[1]).with(&subject.turned);
-                fit_from(pair_bench, vec![model], now, weights)
-            };
-            let over = same.as_ref().unwrap_or(now);
-            let parted = subject.parted(known);
-            let split =
-                |model: Model| if known { model.apart(&parted) } else { model.with(&subject.turned).apart(&parted) };
-            let starts = vec![split(placed(&now.model, subject, &score.starts[0])), split(over.model.clone())];
-            let Some(fitted) = fit_from(pair_bench, starts, over, weights) else { continue };
-            let worth = |a: &Fitted, b: &Fitted| Worth::of(&a.predicted, &b.predicted, pair_bench.first_of_b);
-            let (change, whole) = (worth(&fitted, over), worth(&fitted, now));
-            let cost = if known { parted.len() } else { subject.turned.len() + parted.len() };
-            self.trials.push(Trial { subject: score.subject, fitted, change, whole, cost });
-            let of_same = same.map(|same| (worth(&same, now), same));
-            if let Some((gain, same)) = of_same.filter(|(gain, _)| gain.is_proven(subject.turned.len())) {
-                let net = gain.nats - 0.5 * subject.turned.len() as f64;
-                if in_both.as_ref().is_none_or(|(_, best)| net > *best) {
-                    in_both = Some((same, net));
-                }
-            }
-        }
-        Some(in_both)
-    }
-
     /// Trials that are proven.
     pub(super) fn proven(&self) -> impl Iterator<Item = &Trial> {
-        self.trials.iter().filter(|trial| trial.change.is_proven(trial.cost) && trial.whole.is_proven(trial.cost))
+        self.trials.iter().filter(|trial| trial.is_proven())
     }
 
     /// The proven trial that is worth most.
@@ -196,14 +248,14 @@ impl Step {
         self.proven().max_by(|a, b| a.net().total_cmp(&b.net()))
     }
 
-    /// What does as well as the change that was added, with no more numbers.
-    pub(super) fn rivals<E>(&self, pair_bench: &PairBench<'_, E>) -> Vec<&Trial> {
+    /// What does as well as the change that was added, with no more parameters.
+    pub(super) fn rivals<E: Evidence>(&self, pair_bench: &PairBench<'_, E>) -> Vec<&Trial> {
         let Some(added) = self.added.and_then(|added| self.trials.iter().find(|trial| trial.subject == added)) else {
             return Vec::new();
         };
         let alike = |trial: &&Trial| {
-            let ahead = Worth::of(&added.fitted.predicted, &trial.fitted.predicted, pair_bench.first_of_b);
-            trial.subject != added.subject && trial.cost <= added.cost && ahead.nats < ALIKE.max(ahead.chance())
+            let other = trial.subject != added.subject && trial.cost <= added.cost;
+            other && pair_bench.gain(&added.fitted, &trial.fitted).may_be_none(1.0)
         };
         self.proven().filter(alike).collect()
     }
@@ -217,17 +269,13 @@ impl Found {
         subjects: &[Subject],
         (step, rival): (&Step, &Trial),
     ) -> bool {
-        let Some(added) = step.added else { return false };
-        let numbers: Vec<usize> = subjects[added].numbers.clone().filter(|k| is_apart(&self.last.model, *k)).collect();
+        let (Some(added), last) = (step.added, &self.last.fitted) else { return false };
         let subject = &subjects[rival.subject];
-        let own: Vec<usize> = subject.numbers.clone().filter(|k| is_apart(&rival.fitted.model, *k)).collect();
-        let model = placed(&self.last.model.clone().together(&numbers), subject, &rival.fitted.model.values);
-        let model = model.with(&subject.turned).apart(&own);
-        let swapped = pair_bench.fit(model, &self.weights, Some(&self.last), FIRST_PASS);
-        swapped.is_none_or(|swapped| {
-            let ahead = Worth::of(&self.last.predicted, &swapped.predicted, pair_bench.first_of_b);
-            ahead.nats < ALIKE.max(ahead.chance())
-        })
+        let model = last.model.clone().together(&own(&last.model, &subjects[added]));
+        let model = placed(&model, subject, &rival.fitted.model.values).with(&subject.turned);
+        let model = model.apart(&own(&rival.fitted.model, subject));
+        let swapped = pair_bench.fit(model, &self.weights, Some(last), REFINEMENT);
+        swapped.is_none_or(|swapped| pair_bench.gain(last, &swapped).may_be_none(1.0))
     }
 }
 
@@ -240,61 +288,15 @@ fn placed(model: &Model, subject: &Subject, others: &[Vec<f64>; 2]) -> Model {
     model
 }
 
-/// A fit from the first of several starts from which it comes to more than the model `near` it.
-fn fit_from<E: Evidence>(
-    pair_bench: &PairBench<'_, E>,
-    starts: Vec<Model>,
-    near: &Fitted,
-    weights: &[f64],
-) -> Option<Fitted> {
-    let mut best: Option<Fitted> = None;
-    for start in starts {
-        let heat = pair_bench.fit(start, weights, Some(near), HEAT);
-        let least = best.as_ref().map_or(f64::INFINITY, |best| best.hypothesis.deviance());
-        best = heat.filter(|heat| heat.hypothesis.deviance() < least).or(best);
-        if best.as_ref().is_some_and(|best| best.hypothesis.deviance() < near.hypothesis.deviance()) {
-            break;
-        }
-    }
-    let best = best?;
-    pair_bench.fit(best.model.clone(), weights, Some(&best), FIRST_PASS)
-}
-
-/// Drops changes that those found after them make superfluous.
-fn without_superfluous<E: Evidence>(
-    pair_bench: &PairBench<'_, E>,
-    subjects: &[Subject],
-    (mut now, mut changed): (Fitted, Vec<usize>),
-    weights: &[f64],
-) -> (Fitted, Vec<usize>) {
-    while changed.len() > 1 && !pair_bench.bench.interrupt.asked() {
-        let dropped = changed.iter().position(|subject| {
-            let numbers: Vec<usize> = subjects[*subject].numbers.clone().filter(|k| is_apart(&now.model, *k)).collect();
-            let fit =
-                pair_bench.fit(now.model.clone().together(&numbers), weights, Some(&now), last_pass(pair_bench.bench));
-            let superfluous = fit.filter(|fit| {
-                let loss = Worth::of(&now.predicted, &fit.predicted, pair_bench.first_of_b);
-                !loss.is_proven(numbers.len())
-            });
-            superfluous.map(|fit| now = fit).is_some()
-        });
-        match dropped {
-            Some(place) => drop(changed.remove(place)),
-            None => break,
-        }
-    }
-    (now, changed)
-}
-
 /// The smallest change of a size that is proven in nine of ten sessions like these, from one sigma of it: its gain must come to what a
 /// change has to be worth, less what its numbers gain by chance.
 pub(super) fn smallest_seen(sigma: f64, cost: usize) -> f64 {
-    let needed = LEAST.max(cost as f64) + 0.5 * cost as f64;
-    sigma * (NINE_OF_TEN + (NINE_OF_TEN * NINE_OF_TEN + 2.0 * needed).sqrt())
+    let needed = CHANGES.price(cost) + 0.5 * cost as f64;
+    sigma * (NINE_OF_TEN_SIGMAS + (NINE_OF_TEN_SIGMAS * NINE_OF_TEN_SIGMAS + 2.0 * needed).sqrt())
 }
 
 /// Nine of ten normal numbers lie above so many sigmas below their mean.
-const NINE_OF_TEN: f64 = 1.2816;
+const NINE_OF_TEN_SIGMAS: f64 = 1.2816;
 
 #[cfg(test)]
 mod tests {
@@ -304,7 +306,7 @@ mod tests {
     fn a_change_of_the_smallest_size_that_is_seen_gains_enough_in_nine_of_ten() {
         let size = smallest_seen(1.0, 1);
         let gained = |noise: f64| 0.5 * size * size + noise * size;
-        assert!((gained(-NINE_OF_TEN) - (LEAST + 0.5)).abs() < 1e-9, "{size}");
+        assert!((gained(-NINE_OF_TEN_SIGMAS) - (CHANGES.min_gain_nats + 0.5)).abs() < 1e-9, "{size}");
         assert!(smallest_seen(1.0, 7) > size && (smallest_seen(0.1, 1) / size - 0.1).abs() < 1e-9);
     }
 }

@@ -52,7 +52,7 @@ pub(super) struct Model {
 }
 
 /// How far gains of the second session may be from what cell.toml states: firmware gains are switched by powers of two.
-const GAIN_SWITCHED: f64 = 10.0;
+const MAX_GAIN_FACTOR: f64 = 10.0;
 
 impl Model {
     /// Everything shared: `free` numbers at `full`.
@@ -118,7 +118,7 @@ impl Model {
             let is_gain =
                 matches!(whole.settings.settings()[turned.number], Setting::Stiffness(_) | Setting::Damping(_));
             let [lower, upper] = if of_b && is_gain {
-                [unknown.lower / GAIN_SWITCHED, unknown.upper * GAIN_SWITCHED]
+                [unknown.lower / MAX_GAIN_FACTOR, unknown.upper * MAX_GAIN_FACTOR]
             } else {
                 [unknown.lower, unknown.upper]
             };

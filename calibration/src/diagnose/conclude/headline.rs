@@ -3,8 +3,8 @@
 use super::verdict::{Decision, Finding};
 use crate::answer::diagnosis::{Kind, Share};
 use crate::diagnose::judge::gap::Shrunk;
-use crate::diagnose::judge::trial::CLOSES;
 use crate::words::{percent, words};
+use crate::diagnose::judge::trial::MIN_SHARE_CLOSED;
 
 /// What the sentence is made of, beside the finding itself.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -40,11 +40,11 @@ impl Shrunk {
     /// `by 96 % on held-out clips`. Where one clip outweighs all others, what most do, and in how many it grows.
     fn in_words(&self) -> String {
         let [shrinks, all] = self.clips;
-        if self.mean >= CLOSES || shrinks == all {
+        if self.mean >= MIN_SHARE_CLOSED || shrinks == all {
             let percent = percent(self.mean).replace("> ", "more than ").replace("< ", "less than ");
             return format!("by {percent} on held-out clips");
         }
-        let of_contact = self.usual <= CLOSES && self.contact > self.usual;
+        let of_contact = self.usual <= MIN_SHARE_CLOSED && self.contact > self.usual;
         let (share, whose) = if of_contact { (self.contact, "the joints in contact of ") } else { (self.usual, "") };
         format!("by {} in {whose}a held-out clip like most, but grows in {} of {all}", percent(share), all - shrinks)
     }

@@ -12,7 +12,7 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
 use crate::diagnose::fit::time_step;
-use crate::diagnose::judge::gap::{DOUBLED, Residuals};
+use crate::diagnose::judge::gap::{Residuals, SHRINK_OF_A_DOUBLED_GAP};
 use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::judge::{confidence, held_out};
 use crate::diagnose::propose::screening;
@@ -21,7 +21,7 @@ use inference::likelihood::Evidence;
 /// What nobody fitted closes nothing.
 const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
 /// Of numbers with which the twin has no answer in the clips kept for confirming.
-const NO_ANSWER: Share = Share { value: DOUBLED, ci90: [DOUBLED; 2] };
+const NO_ANSWER: Share = Share { value: SHRINK_OF_A_DOUBLED_GAP, ci90: [SHRINK_OF_A_DOUBLED_GAP; 2] };
 
 /// What is said of every candidate: what was named first, then what is possible, then the likelier.
 pub(super) fn candidates<E: Evidence>(
@@ -138,7 +138,7 @@ fn confusable<E: Evidence>(first: &Step, effect: usize, overdispersion: f64, ben
 
 /// What is added to the reason where numbers that fit some clips are wrong in the others.
 fn carried_over(shrink: &Share) -> &'static str {
-    if shrink.value > DOUBLED {
+    if shrink.value > SHRINK_OF_A_DOUBLED_GAP {
         return "";
     }
     "; its numbers fit the clips they were found on alone: on those kept for confirming the gap more than doubles"

@@ -4,10 +4,11 @@ use super::verdict::Finding;
 use crate::answer::diagnosis::{Kind, Status};
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::shortlist::{BY_CHANCE, TESTABLE};
-use crate::diagnose::judge::score::Advantage;
-use crate::diagnose::judge::trial::{Found, NEARLY_ALL, PLAIN, Trial, WORTHWHILE, convincing};
+use crate::diagnose::judge::trial::{Found, LARGE_SHARE_CLOSED, MIN_NATS_PER_ROW, Trial};
 use crate::words::words;
 use inference::likelihood::Evidence;
+use crate::diagnose::select::criteria::EFFECTS;
+use crate::diagnose::select::gain::Gain;
 
 /// A candidate with all that its reason is drawn from.
 #[derive(Debug, Clone, Copy)]
@@ -60,7 +61,7 @@ pub(in crate::diagnose) fn reason<E: Evidence>(bench: &Bench<'_, E>, found: &Fou
 }
 
 /// Against a candidate that was fitted.
-fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>, advantage: &Advantage) -> String {
+fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>, advantage: &Gain) -> String {
     let Judged { trial, finding, .. } = judged;
     let (effect, cost) = (trial.scored.candidate, trial.scored.cost);
     let name = bench.library.candidates[effect].effect.name;
@@ -72,8 +73,8 @@ fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>
         return format!("does not predict held-out clips better: log-likelihood changes by {gain}");
     }
     let gain = nats(advantage.nats, advantage.error);
-    let plain = trial.closes > PLAIN && advantage.share > NEARLY_ALL;
-    if !convincing(advantage, cost) && !plain {
+    let plain = trial.closes > LARGE_SHARE_CLOSED && advantage.in_nearly_all();
+    if !EFFECTS.proves(advantage, cost) && !plain {
         let share = 100.0 * advantage.share;
         return format!(
             "no better than chance: the log-likelihood of held-out clips rises by {gain} for {}, in {share:.0} % of the clips",
@@ -81,13 +82,13 @@ fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>
         );
     }
     if let Some((leader, its)) = leader(bench, found, judged) {
-        let (beyond, error) = its.beyond(advantage);
+        let ahead = its.beyond(advantage);
         let other = words(bench.library.candidates[leader.scored.candidate].effect.name);
         let fewer = if leader.scored.cost < cost { ", with fewer parameters" } else { "" };
-        if beyond > 0.0 {
+        if ahead.nats > 0.0 {
             return format!(
                 "{other} predicts held-out clips better: log-likelihood higher by {}{fewer}",
-                nats(beyond, error)
+                nats(ahead.nats, ahead.error)
             );
         }
         if trial.is_outdone_by(leader) {
@@ -106,7 +107,7 @@ fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>
         return "does no more than shift commands by one control period beside another effect that shifts them".into();
     }
     let step = &found.steps[judged.place];
-    if bench.library.candidates[effect].is_of_arm() && advantage.nats <= WORTHWHILE * step.arm_rows as f64 {
+    if bench.library.candidates[effect].is_of_arm() && advantage.nats <= MIN_NATS_PER_ROW * step.arm_rows as f64 {
         return format!(
             "the log-likelihood rises by {gain} over {} residuals of the arm: numerical differences add up to as much",
             step.arm_rows
@@ -141,7 +142,7 @@ fn leader<'a, E: Evidence>(
     bench: &Bench<'_, E>,
     found: &'a Found,
     judged: &Judged<'_>,
-) -> Option<(&'a Trial, &'a Advantage)> {
+) -> Option<(&'a Trial, &'a Gain)> {
     let step = &found.steps[judged.place];
     let kept = found.kept().find(|(place, _)| *place == judged.place).map(|(_, effect)| effect);
     let of = |effect| step.trials.iter().find(|trial| trial.scored.candidate == effect);

@@ -56,7 +56,7 @@ impl Verdict {
     /// What [`Verdict::confidence`] is.
     pub fn basis(&self) -> Basis {
         let most = match self.kind {
-            Kind::Named => confidence::MOST,
+            Kind::Named => confidence::MAX_PROBABILITY,
             Kind::None => NONE_IS_RIGHT.value,
             Kind::Class | Kind::Unexplained => return Basis::Rate,
             Kind::NotTestable => return Basis::Nothing,
@@ -228,7 +228,7 @@ pub(in crate::diagnose) mod tests {
     fn a_confidence_at_its_limit_is_no_estimate() {
         let basis = |finding: &Finding<'_>| finding.decide().said(String::new()).basis();
         let named = |confidence| Finding { confidence, ..finding(vec!["payload"], 500.0, 1.5) };
-        assert_eq!(basis(&named(confidence::MOST)), Basis::Limit);
+        assert_eq!(basis(&named(confidence::MAX_PROBABILITY)), Basis::Limit);
         assert_eq!(basis(&named(0.8)), Basis::Estimate);
         assert_eq!(basis(&finding(vec![], 1.0, 1.0)), Basis::Limit);
         assert_eq!(basis(&finding(vec![], 500.0, 500.0)), Basis::Rate);

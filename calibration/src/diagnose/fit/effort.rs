@@ -24,10 +24,10 @@ impl Effort {
 }
 
 /// Every candidate's fit gets so many linearisations from its signature on; those that come near the best get more.
-pub(in crate::diagnose) const HEAT: Effort = Effort::of(3, Precision::Joints);
+pub(in crate::diagnose) const SCREENING: Effort = Effort::of(3, Precision::Joints);
 /// A look at an object's clips with what was fitted to the arm alone.
-pub(in crate::diagnose) const LOOK: Effort = Effort::of(1, Precision::Joints);
+pub(in crate::diagnose) const PROBE: Effort = Effort::of(1, Precision::Joints);
 /// A candidate that came near the best.
-pub(in crate::diagnose) const FIRST_PASS: Effort = Effort::of(6, Precision::Joints);
-/// Near is this far from the best deviance, or a share of what the best gains.
-pub(in crate::diagnose) const NEAR: f64 = 40.0;
+pub(in crate::diagnose) const REFINEMENT: Effort = Effort::of(6, Precision::Joints);
+/// Near is within this of the best deviance, or within a share of what the best gains (a choice).
+pub(in crate::diagnose) const NEAR_DEVIANCE: f64 = 40.0;

@@ -17,6 +17,11 @@ pub(in crate::diagnose) const REFINEMENT: &str = "refinement";
 /// The confirm clips are opened.
 pub(in crate::diagnose) const CONCLUSION: &str = "conclusion";
 
+/// What the bar says while a candidate is looked at.
+pub(in crate::diagnose) fn of(stage: &str, candidate: &str) -> String {
+    format!("{stage}: {}", candidate.replace('_', " "))
+}
+
 /// A search that finds one effect, and then looks for another beside it.
 pub(in crate::diagnose) const ARM: [Planned; 9] = [
     (BASELINE, 1.0),

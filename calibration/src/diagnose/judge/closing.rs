@@ -8,9 +8,9 @@ use inference::admit::Split;
 use inference::likelihood::{Evidence, Group};
 
 /// A gap smaller than this, over its floor, is taken for this size.
-const LEAST_GAP: f64 = 1.2;
+const MIN_GAP_RATIO: f64 = 1.2;
 /// A gap widened by less than this share is chance.
-const HARM: f64 = 0.1;
+const MAX_SHARE_WIDENED: f64 = 0.1;
 
 /// How much of the way is gone between two hypotheses on all clips but those for confirming, of the group of sensors in which it is largest; 0
 /// where the gap widens on clips that were not fitted. `whole`: what the baseline leaves.
@@ -30,13 +30,13 @@ pub fn closes<E: Evidence>(
         Some(shares.chain(contact).collect())
     };
     let (Some(open), Some(choose)) = (on(&split.open()), on(split.elsewhere())) else { return 0.0 };
-    let harmless = |(_, choose): &(&f64, &f64)| **choose > -HARM;
+    let harmless = |(_, choose): &(&f64, &f64)| **choose > -MAX_SHARE_WIDENED;
     open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
 }
 
 /// How much of the way from the gap down to noise is gone, on a logarithmic scale.
 fn way(before: f64, after: f64, floor: f64) -> f64 {
-    (before / after).ln() / (before / floor).max(LEAST_GAP).ln()
+    (before / after).ln() / (before / floor).max(MIN_GAP_RATIO).ln()
 }
 
 /// The same of what is left of a gap. A real arm's gap lies so far above the noise that nobody comes down to it: there the plain

@@ -1,32 +1,25 @@
 //! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
 
-use super::trial::{Step, Trial, net};
-use crate::diagnose::criteria::NAMED_IS_WRONG;
+use super::trial::{Step, Trial};
+use crate::diagnose::criteria::{ALIKE_SHARE, NAMED_IS_WRONG};
 use crate::diagnose::library::Library;
-use inference::statistics::student_sigmas;
 
-/// Rivals this close cannot be told apart [nats].
-const NEAR: f64 = 4.0;
-/// ... or within so many standard errors of their difference, were these known exactly.
-const CHANCE: f64 = 2.0;
-/// A rival closes at least this share of the gap that the chosen one closes, and of its way down to noise.
-const ALIKE: f64 = 0.5;
 /// The largest probability of a candidate: its limit, whatever the clips say.
-pub const MOST: f64 = 1.0 - NAMED_IS_WRONG.value;
+pub const MAX_PROBABILITY: f64 = 1.0 - NAMED_IS_WRONG.value;
 /// Nats count less than they say: twins are never exact. The temperature that made shares agree with frequencies.
-const TEMPERATURE: f64 = 4.0;
+pub(in crate::diagnose) const TEMPERATURE_NATS: f64 = 4.0;
 
 /// Probability of every candidate tried in a step that could be the cause, and what is left for none of them.
 pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
     let fitted: Vec<(usize, f64)> = (trials.iter())
         .filter(|trial| trial.is_cause() && !trials.iter().any(|other| other.is_cause() && trial.is_outdone_by(other)))
-        .filter_map(|trial| trial.fitted.as_ref().map(|(_, a)| (trial.scored.candidate, net(a, trial.scored.cost))))
+        .filter_map(|trial| Some((trial.scored.candidate, trial.gain()?.net(trial.scored.cost))))
         .collect();
     let best = fitted.iter().map(|(_, worth)| *worth).fold(0.0, f64::max);
-    let weight = |worth: f64| ((worth - best) / TEMPERATURE).exp();
+    let weight = |worth: f64| ((worth - best) / TEMPERATURE_NATS).exp();
     let nothing = if none { 1.0 / NAMED_IS_WRONG.value } else { weight(0.0) };
     let total: f64 = fitted.iter().map(|(_, worth)| weight(*worth)).sum::<f64>() + nothing;
-    fitted.iter().map(|(candidate, worth)| (*candidate, MOST * weight(*worth) / total)).collect()
+    fitted.iter().map(|(candidate, worth)| (*candidate, MAX_PROBABILITY * weight(*worth) / total)).collect()
 }
 
 /// Candidates of a step that explain it as well as the chosen one: whose gains, clip by clip, are not less beyond chance, and
@@ -34,36 +27,22 @@ pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
 /// it is enough that it closes a cause's share: how much any of the two closes depends on how far their fits have come.
 /// Differences count `overdispersion` times less.
 pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64) -> Vec<usize> {
-    let of = |candidate: usize| {
-        let trial = step.trials.iter().find(|trial| trial.scored.candidate == candidate)?;
-        trial.fitted.as_ref().map(|(_, advantage)| (advantage, trial))
+    let Some((chosen_trial, best)) = step.trial(chosen).and_then(|trial| Some((trial, trial.gain()?))) else {
+        return Vec::new();
     };
-    let Some((best, chosen_trial)) = of(chosen) else { return Vec::new() };
-    let near = |candidate: &usize| {
-        let Some((other, trial)) = of(*candidate).filter(|_| *candidate != chosen) else { return false };
-        let (beyond, error) = best.beyond(other);
-        let (beyond, error) = (beyond / overdispersion, error / overdispersion);
-        let alike = alike(beyond, error, best.clips()) && other.nats > other.error;
+    let near = |trial: &&Trial| {
+        let candidate = trial.scored.candidate;
+        let Some(other) = trial.gain().filter(|_| candidate != chosen) else { return false };
+        let alike = best.beyond(other).may_be_none(overdispersion) && other.nats > other.error;
         let dearer = trial.scored.cost > chosen_trial.scored.cost;
         let enough = match dearer {
             true => trial.closes_more_than(chosen_trial),
-            false if library.look_alike(*candidate, chosen) => trial.is_cause(),
-            false => trial.closes > ALIKE * chosen_trial.closes,
+            false if library.look_alike(candidate, chosen) => trial.is_cause(),
+            false => trial.closes > ALIKE_SHARE * chosen_trial.closes,
         };
         alike && enough && step.comes_as_near(trial, chosen_trial)
     };
-    step.trials.iter().map(|trial| trial.scored.candidate).filter(near).collect()
-}
-
-/// Whether an advantage over a rival could be chance.
-pub fn alike(beyond: f64, error: f64, clips: usize) -> bool {
-    beyond < NEAR.max(chance(clips) * error)
-}
-
-/// [`CHANCE`] where the error is itself told from so few clips: the quantile of Student's distribution at the same
-/// probability.
-fn chance(clips: usize) -> f64 {
-    student_sigmas(CHANCE, clips.saturating_sub(1))
+    step.trials.iter().filter(near).map(|trial| trial.scored.candidate).collect()
 }
 
 #[cfg(test)]
@@ -109,16 +88,19 @@ mod tests {
             all.iter().find(|(candidate, _)| *candidate == 0).map_or(0.0, |(_, p)| *p)
         };
         let cause = trial(0, 100.0, 0.4);
-        assert!((sure(&[cause.clone(), trial(1, 150.0, 0.05)]) - MOST).abs() < 1e-6);
+        assert!((sure(&[cause.clone(), trial(1, 150.0, 0.05)]) - MAX_PROBABILITY).abs() < 1e-6);
         assert!(sure(&[cause.clone(), trial(1, 150.0, 0.4)]) < 0.1, "one that closes as much does");
         let mut dearer = trial(1, 103.0, 0.41);
         dearer.scored.cost = 8;
-        assert!((sure(&[cause.clone(), dearer.clone()]) - MOST).abs() < 1e-6, "one with more numbers does not");
-        // ... unless it closes markedly more, where own numbers of clips could hide that from the likelihood.
+        assert!(
+            (sure(&[cause.clone(), dearer.clone()]) - MAX_PROBABILITY).abs() < 1e-6,
+            "one with more numbers does not"
+        );
+        // ... unless it closes markedly more, where nuisance parameters of clips could hide that from the likelihood.
         dearer.closes = 0.5;
         assert!(sure(&[cause.clone(), dearer.clone()]) < 0.6, "one that closes markedly more does");
         dearer.own_numbers = false;
-        assert!((sure(&[cause, dearer]) - MOST).abs() < 1e-6);
+        assert!((sure(&[cause, dearer]) - MAX_PROBABILITY).abs() < 1e-6);
     }
 
     #[test]
@@ -174,7 +156,10 @@ mod tests {
         let all_but_noise = leaves(0, 1e3, false);
         assert!(!before.comes_as_near(&leaves(1, 4e5, false), &all_but_noise), "60 % of the gap, a seventh of the way");
         assert!(before.comes_as_near(&leaves(1, 5e3, false), &all_but_noise));
-        assert!(before.comes_as_near(&leaves(1, 4e5, true), &all_but_noise), "own numbers of clips may hide it");
+        assert!(
+            before.comes_as_near(&leaves(1, 4e5, true), &all_but_noise),
+            "nuisance parameters of clips may hide it"
+        );
 
         // One clip has nearly all of the gap, so that gains scatter from clip to clip as much as they differ.
         let cell = shipped();
@@ -198,13 +183,5 @@ mod tests {
         };
         assert!(leads(4e5), "the other leaves most of the gap");
         assert!(!leads(2e3), "the other leaves as little");
-    }
-
-    #[test]
-    fn few_clips_must_differ_by_more() {
-        // Quantiles of Student's distribution at 0.977250, from tables.
-        for (clips, quantile) in [(3, 4.527), (6, 2.649), (12, 2.255), (1000, 2.003)] {
-            assert!((chance(clips) / quantile - 1.0).abs() < 0.04, "{clips}: {}", chance(clips));
-        }
     }
 }

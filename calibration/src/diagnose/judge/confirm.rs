@@ -7,11 +7,12 @@
 use super::gap::{Residuals, Shrunk};
 use super::held_out::Fits;
 use super::remainder::{self, Left};
-use super::score::{Advantage, predict_unseen};
-use super::trial::CLOSES;
+use super::score::predict_unseen;
+use super::trial::MIN_SHARE_CLOSED;
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::fit::bench::Bench;
 use inference::likelihood::{Evidence, Group};
+use crate::diagnose::select::gain::Gain;
 
 /// What they say.
 pub(in crate::diagnose) struct Confirmation {
@@ -56,16 +57,16 @@ fn shrunk([before, after]: [&Residuals; 2], seed: u64) -> Shrunk {
 
 /// Whether clips with an object speak for it: more of them are predicted better than worse, in sum by more than its standard error,
 /// and enough of the gap closes: in the mean of squares, or in a clip like most.
-fn speaks_for(advantage: &Advantage, shrink: &Shrunk, mean: f64) -> bool {
-    let better = advantage.share > 0.5 && advantage.nats > advantage.error;
-    better && mean.max(shrink.usual).max(shrink.contact) > CLOSES
+fn speaks_for(gain: &Gain, shrink: &Shrunk, mean: f64) -> bool {
+    let better = gain.share > 0.5 && gain.nats > gain.error;
+    better && mean.max(shrink.usual).max(shrink.contact) > MIN_SHARE_CLOSED
 }
 
-/// The same of clips of the arm alone, which have no numbers of their own. Their likelihood is nothing but their residuals, and weighs
+/// The same of clips of the arm alone, which have no nuisance parameters. Their likelihood is nothing but their residuals, and weighs
 /// these by what the search took for noise before anything was found: the plain residuals count, in more clips than not.
 fn shrinks_in_most(shrink: &Shrunk, mean: f64) -> bool {
     let [shrinks, all] = shrink.clips;
-    2 * shrinks > all && mean.max(shrink.usual) > CLOSES
+    2 * shrinks > all && mean.max(shrink.usual) > MIN_SHARE_CLOSED
 }
 
 fn mean([before, after]: [&Residuals; 2]) -> f64 {
@@ -91,7 +92,7 @@ mod tests {
     use super::*;
 
     /// What four clips gain by being predicted with what was found [nats].
-    fn gains(gains: [f64; 4]) -> Advantage {
+    fn gains(gains: [f64; 4]) -> Gain {
         let predicted = |gains: [f64; 4]| {
             let clips = gains.iter().enumerate().map(|(clip, gain)| (clip, 4000.0 - 2.0 * gain)).collect();
             Predicted { clips }

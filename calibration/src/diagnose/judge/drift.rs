@@ -10,11 +10,11 @@ use inference::likelihood::random_effects::RandomEffects;
 use inference::statistics::student_sigmas;
 
 /// A slope of so many sigmas of a normal distribution, or as unlikely a one of few clips, is no chance: p = 0.02.
-const NO_CHANCE: f64 = 2.33;
+const MIN_SLOPE_SIGMAS: f64 = 2.33;
 /// ... and over the session the friction changes by so many sigmas of its scatter from clip to clip.
-const LEAST: f64 = 6.0;
+const MIN_CHANGE_SIGMAS: f64 = 6.0;
 /// A line through fewer clips tells nothing.
-const FEWEST: usize = 5;
+const MIN_CLIPS: usize = 5;
 
 /// How much the friction of the last clip is over that of the first, less 1; `None` where it does not drift.
 pub fn of_friction(scatter: &RandomEffects, hypothesis: &Hypothesis) -> Option<f64> {
@@ -23,13 +23,13 @@ pub fn of_friction(scatter: &RandomEffects, hypothesis: &Hypothesis) -> Option<f
     let points: Vec<(f64, f64)> =
         hypothesis.fitted.iter().map(|fitted| (fitted.clip as f64, fitted.own[number])).collect();
     let change = trend(&points)?;
-    (change.abs() > LEAST * scatter.random[number].sigma).then(|| change.exp_m1())
+    (change.abs() > MIN_CHANGE_SIGMAS * scatter.random[number].sigma).then(|| change.exp_m1())
 }
 
 /// By how much the line through points rises from the first to the last, where its slope is no chance.
 fn trend(points: &[(f64, f64)]) -> Option<f64> {
     let count = points.len();
-    if count < FEWEST {
+    if count < MIN_CLIPS {
         return None;
     }
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count as f64;
@@ -39,7 +39,7 @@ fn trend(points: &[(f64, f64)]) -> Option<f64> {
     let (slope, degrees) = (xy / xx, count - 2);
     let error = ((yy - slope * xy).max(0.0) / degrees as f64 / xx).sqrt();
     let span = points.last()?.0 - points.first()?.0;
-    (slope.abs() > student_sigmas(NO_CHANCE, degrees) * error).then_some(slope * span)
+    (slope.abs() > student_sigmas(MIN_SLOPE_SIGMAS, degrees) * error).then_some(slope * span)
 }
 
 #[cfg(test)]

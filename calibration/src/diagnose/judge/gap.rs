@@ -47,7 +47,7 @@ pub struct Typical {
 
 /// The groups whose gap is said. The arm in contact is evidence for causes, and no gap of its own: how far a joint yields
 /// to a push says how the object resists.
-const SAID: [Group; 2] = [Group::Arm, Group::Object];
+const WITH_A_GAP: [Group; 2] = [Group::Arm, Group::Object];
 
 /// Place of a group's sums.
 fn place(group: Group) -> usize {
@@ -78,7 +78,7 @@ impl Residuals {
             Some((*clip, out))
         };
         let clips: Vec<(usize, Vec<f64>)> = clips.par_iter().map(one).collect::<Option<_>>()?;
-        let cut = DRAWN_FROM.div_ceil(clips.len().max(1));
+        let cut = MIN_PIECES.div_ceil(clips.len().max(1));
         let in_pieces = |(clip, residuals): &(usize, Vec<f64>)| pieces(bench.evidence, *clip, residuals, cut);
         let pieces = clips.iter().flat_map(in_pieces).collect();
         let sums = clips.iter().map(|(clip, residuals)| sums(bench.evidence, *clip, residuals)).collect();
@@ -94,7 +94,7 @@ impl Residuals {
     /// Of every group of sensors, the geometric mean over clips of their mean squares: one stroke that went its own way
     /// decides little, and a cause that shows in some clips only is seen.
     pub fn typical(&self) -> Vec<Typical> {
-        SAID.into_iter().filter_map(|group| self.typical_of(group)).collect()
+        WITH_A_GAP.into_iter().filter_map(|group| self.typical_of(group)).collect()
     }
 
     /// The same of one group; `None` where no clip has any of it.
@@ -127,31 +127,35 @@ impl Residuals {
     }
 
     /// What a step from `from` to this adds to the shrink: `(from - after) / before`. Steps that follow each other add up to
-    /// the shrink of the whole. At least [`DOUBLED`].
+    /// the shrink of the whole. At least [`SHRINK_OF_A_DOUBLED_GAP`].
     pub fn shrink_added(&self, from: &Self, before: &Self, seed: u64) -> Share {
         let of = |drawn: &[usize]| {
             let [from, after, before] = [from, self, before].map(|residuals| mean(&residuals.pieces, drawn));
-            ((from - after) / before.max(f64::MIN_POSITIVE)).max(DOUBLED)
+            ((from - after) / before.max(f64::MIN_POSITIVE)).max(SHRINK_OF_A_DOUBLED_GAP)
         };
         let all: Vec<usize> = (0..self.pieces.len()).collect();
         let mut rng = Pcg64::seed_from_u64(seed);
-        let mut drawn: Vec<f64> =
-            (0..DRAWS).map(|_| of(&all.iter().map(|_| rng.random_range(0..all.len())).collect::<Vec<_>>())).collect();
+        let mut drawn: Vec<f64> = (0..BOOTSTRAP_DRAWS)
+            .map(|_| of(&all.iter().map(|_| rng.random_range(0..all.len())).collect::<Vec<_>>()))
+            .collect();
         drawn.sort_unstable_by(f64::total_cmp);
-        Share { value: of(&all), ci90: [drawn[DRAWS / 20], drawn[DRAWS - 1 - DRAWS / 20]] }
+        Share {
+            value: of(&all),
+            ci90: [drawn[BOOTSTRAP_DRAWS / 20], drawn[BOOTSTRAP_DRAWS - 1 - BOOTSTRAP_DRAWS / 20]],
+        }
     }
 }
 
 /// The share by which a gap shrinks that becomes twice as large. Numbers that fit some clips may be anything in others, up
 /// to an arm that swings without end: beyond twice the gap the share tells how soon a simulation was given up, not how
 /// wrong the numbers are.
-pub const DOUBLED: f64 = -1.0;
+pub const SHRINK_OF_A_DOUBLED_GAP: f64 = -1.0;
 
-/// Draws of the bootstrap.
-const DRAWS: usize = 1000;
+/// Draws of the bootstrap (a choice).
+const BOOTSTRAP_DRAWS: usize = 1000;
 
-/// It draws from at least so many pieces: from fewer an interval is far too narrow.
-const DRAWN_FROM: usize = 8;
+/// It draws from at least so many pieces (a choice): from fewer an interval is far too narrow.
+const MIN_PIECES: usize = 8;
 
 fn sums(evidence: &impl Evidence, clip: usize, residuals: &[f64]) -> Vec<(f64, f64)> {
     pieces(evidence, clip, residuals, 1).swap_remove(0)
@@ -170,7 +174,7 @@ fn pieces(evidence: &impl Evidence, clip: usize, residuals: &[f64], cut: usize) 
     pieces
 }
 
-/// The sums that noise of one sigma and own numbers that scatter as assumed would give.
+/// The sums that noise of one sigma and nuisance parameters that scatter as assumed would give.
 fn sums_of_noise<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Vec<(f64, f64)> {
     let rows = bench.evidence.rows(clip);
     let mut squares = vec![1.0; rows.len()];
@@ -188,7 +192,7 @@ fn group_means(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> Vec<f64> {
         let (sum, count) = drawn.iter().map(of_clip).fold((0.0, 0.0), add);
         (count > 0.0).then(|| sum / count)
     };
-    SAID.into_iter().filter_map(of).collect()
+    WITH_A_GAP.into_iter().filter_map(of).collect()
 }
 
 fn mean(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> f64 {
@@ -227,7 +231,7 @@ mod tests {
     #[test]
     fn a_fit_that_flies_apart_in_other_clips_doubles_the_gap_and_no_more() {
         let shrink = residuals(&[1e53, 1.0, 1.0, 1.0]).shrink(&residuals(&[2.0; 4]), 1);
-        assert_eq!((shrink.value, shrink.ci90[0]), (DOUBLED, DOUBLED));
+        assert_eq!((shrink.value, shrink.ci90[0]), (SHRINK_OF_A_DOUBLED_GAP, SHRINK_OF_A_DOUBLED_GAP));
         assert!(shrink.ci90[1] <= 0.75, "{shrink:?}");
     }
 
@@ -242,7 +246,7 @@ mod tests {
             let [before, after] =
                 [baseline, found].map(|fit| Residuals::at(bench, &fit, &[1]).expect("it can be simulated"));
             let shrink = after.shrink(&before, 1);
-            assert!(before.pieces.len() == DRAWN_FROM, "{} pieces", before.pieces.len());
+            assert!(before.pieces.len() == MIN_PIECES, "{} pieces", before.pieces.len());
             assert!(shrink.ci90[0] < shrink.value && shrink.value < shrink.ci90[1], "{shrink:?}");
         });
     }

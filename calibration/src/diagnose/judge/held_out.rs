@@ -11,7 +11,7 @@ use inference::admit::Split;
 use inference::likelihood::Evidence;
 
 /// Enough for a fit that begins where all clips together have it.
-const EFFORT: Effort = Effort::of(8, Precision::Joints);
+const LEFT_OUT: Effort = Effort::of(8, Precision::Joints);
 
 /// A hypothesis for every clip that is judged: numbers, and clips that they were not fitted to.
 pub(in crate::diagnose) type Fits = Vec<(Hypothesis, Vec<usize>)>;
@@ -28,7 +28,7 @@ pub(in crate::diagnose) fn fits<E: Evidence>(
     let without = |out: &Vec<usize>| {
         let others: Vec<usize> = split.train.iter().copied().filter(|clip| !out.contains(clip)).collect();
         let full = hypothesis.full.clone();
-        Some((bench.fit((&hypothesis.effects, full), &others, weights, Some(hypothesis), EFFORT)?, out.clone()))
+        Some((bench.fit((&hypothesis.effects, full), &others, weights, Some(hypothesis), LEFT_OUT)?, out.clone()))
     };
     split.in_turn.iter().map(without).collect()
 }

@@ -6,7 +6,7 @@ use inference::likelihood::{Evidence, Group};
 use std::collections::BTreeMap;
 
 /// Cells with less than this share are left out.
-const LEAST: f64 = 0.005;
+const MIN_SHARE: f64 = 0.005;
 
 /// Cells, largest first. A residual's noise alone would square to 1.
 pub fn localise(evidence: &impl Evidence, residuals: &Residuals) -> Vec<Place> {
@@ -28,7 +28,7 @@ pub fn localise(evidence: &impl Evidence, residuals: &Residuals) -> Vec<Place> {
         regime: regime.to_owned(),
         share: excess.max(0.0) / total.max(f64::MIN_POSITIVE),
     };
-    let mut places: Vec<Place> = cells.into_iter().map(place).filter(|place| place.share >= LEAST).collect();
+    let mut places: Vec<Place> = cells.into_iter().map(place).filter(|place| place.share >= MIN_SHARE).collect();
     places.sort_by(|a, b| b.share.total_cmp(&a.share));
     places
 }

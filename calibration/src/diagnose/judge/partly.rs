@@ -6,7 +6,7 @@
 //! squared gap on the clips kept for confirming: the whole 90 % interval of the share lies above it. Where it does not, the
 //! interval of all that the search found may: then those that are believed have to close more than half of what all of it
 //! does. Where an effect that is known to look alike does as well, it is proven that one of the two acts, and both are said. One
-//! that is stronger than what is met in practice is said to be unusual: a range is what is known beforehand, and no bar for
+//! that is stronger than what is plausible is said to be unusual: a range is what is known beforehand, and no bar for
 //! what the clips show. What comes after them in the search belongs to the rest.
 
 use super::gap::Residuals;
@@ -14,15 +14,10 @@ use super::held_out::{self, Fits};
 use super::trial::{Found, Step};
 use super::{confidence, remainder};
 use crate::answer::diagnosis::Share;
-
+use crate::diagnose::criteria::MOST_OF_IT;
 use crate::diagnose::fit::bench::Bench;
 use inference::admit::Split;
 use inference::likelihood::Evidence;
-
-/// More than half of the squared gap: then what was found is larger than all that was not.
-const REAL_SHARE: f64 = 0.5;
-/// An effect whose signature explains more than half of the rest is said to explain most of it.
-const LOOKS_LIKE: f64 = 0.5;
 
 /// What is proven.
 pub(in crate::diagnose) struct Partly {
@@ -34,7 +29,7 @@ pub(in crate::diagnose) struct Partly {
     pub(in crate::diagnose) after: Residuals,
     /// Share of the squared gap that it closes there.
     pub(in crate::diagnose) share: Share,
-    /// Whether an effect is stronger than what is met in practice.
+    /// Whether an effect is stronger than what is plausible.
     pub(in crate::diagnose) unusual: bool,
     /// Effects that do as well as one of those that were found: candidates.
     rivals: Vec<usize>,
@@ -54,7 +49,7 @@ pub(in crate::diagnose) fn proven<E: Evidence>(
         let all = (&found.last, &found.steps.last()?.weights[..]);
         Some(held_out::residuals(bench, split, all)?.shrink(before, seed))
     };
-    let most_of = |share: &Share, all: Share| all.ci90[0] > REAL_SHARE && share.value > REAL_SHARE * all.value;
+    let most_of = |share: &Share, all: Share| all.ci90[0] > MOST_OF_IT && share.value > MOST_OF_IT * all.value;
     let one = |count: usize| {
         let weights = &with_effects(&found.steps, count).or(found.steps.last())?.weights;
         let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
@@ -64,7 +59,7 @@ pub(in crate::diagnose) fn proven<E: Evidence>(
         let after = Residuals::of(bench, &fits)?;
         let share = after.shrink(before, seed);
         let unusual = !remainder::implausible(bench, last).is_empty();
-        let real = share.ci90[0] > REAL_SHARE || of_all().is_some_and(|all| most_of(&share, all));
+        let real = share.ci90[0] > MOST_OF_IT || of_all().is_some_and(|all| most_of(&share, all));
         real.then_some(Partly { found: until, fits, after, share, unusual, rivals })
     };
     (1..=all).rev().find_map(one)
@@ -85,10 +80,10 @@ fn beside_what_stands_out<E: Evidence>(
     for (place, effect) in &added {
         let step = &found.steps[*place];
         let mut rivals = confidence::rivals(step, bench.library, *effect, overdispersion[*place]);
-        let trial = |candidate| step.trials.iter().find(|trial| trial.scored.candidate == candidate);
         // What does the same with more numbers is no other cause: dry friction that may fall with speed, and does not.
-        let more_of_it =
-            |rival: usize| trial(rival).zip(trial(*effect)).is_some_and(|(rival, own)| rival.is_outdone_by(own));
+        let more_of_it = |rival: usize| {
+            step.trial(rival).zip(step.trial(*effect)).is_some_and(|(rival, own)| rival.is_outdone_by(own))
+        };
         rivals.retain(|rival| !found.last.effects.contains(rival) && !more_of_it(*rival));
         let known = |rival: &usize| bench.library.look_alike(*rival, *effect);
         if !step.leads(bench.library, *effect) || !rivals.iter().all(known) {
@@ -110,7 +105,7 @@ impl Partly {
     pub(in crate::diagnose) fn looks_like<E>(&self, bench: &Bench<'_, E>) -> Option<&'static str> {
         let step = self.found.steps.iter().find(|step| step.from.effects == self.found.last.effects)?;
         let best = step.trials.iter().max_by(|a, b| a.scored.cosine.total_cmp(&b.scored.cosine))?;
-        let alike = best.scored.cosine.powi(2) > LOOKS_LIKE;
+        let alike = best.scored.cosine.powi(2) > MOST_OF_IT;
         alike.then(|| bench.library.candidates[best.scored.candidate].effect.name)
     }
 }

@@ -4,8 +4,8 @@
 use crate::answer::diagnosis::StageTest;
 use crate::diagnose::DiagnoseError;
 use crate::words::in_unit;
-use inference::admit::Admitted;
-use inference::admit::torques;
+use inference::admit::{Admitted, torques};
+use crate::diagnose::criteria::MOST_OF_IT;
 use shared_mem::cell::Cell;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
@@ -64,12 +64,9 @@ fn judged(simulated: &[Gap], recorded: &[Gap]) -> Option<StageTest> {
     Some(test)
 }
 
-/// From this share on the arm is said to be most of it.
-const MOST: f64 = 0.5;
-
 fn sentence(test: &StageTest) -> String {
     let [simulated, recorded] = [test.simulated_arm_add_m, test.recorded_arm_add_m].map(|add| in_unit("m", add));
-    let mut text = if test.of_the_arm > MOST {
+    let mut text = if test.of_the_arm > MOST_OF_IT {
         format!(
             "Under the recorded motion of the arm the object is {recorded} off (ADD), under the simulated one {simulated}: {:.0} % of \
              its gap is the arm's, and only the rest belongs to hit and slide.",
@@ -114,7 +111,7 @@ mod tests {
         let late = of(&with_effect("command_delay", 3, Kind::Strokes, &cell));
         assert!(late.recorded_arm_add_m < late.simulated_arm_add_m, "{late:?}");
         let tilted = of(&with_effect("table_tilt", 3, Kind::Strokes, &cell));
-        assert!(tilted.of_the_arm < MOST && tilted.text.contains("not the arm's"), "{tilted:?}");
+        assert!(tilted.of_the_arm < MOST_OF_IT && tilted.text.contains("not the arm's"), "{tilted:?}");
         assert_eq!((late.untouched, tilted.untouched), (0, 0));
     }
 

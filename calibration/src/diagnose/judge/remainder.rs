@@ -1,23 +1,19 @@
 //! What the named effects leave: whether it is small enough to believe that they are the cause.
 //!
-//! A substitute for a cause that the library does not know fits a part of it, grows beyond what is met in practice, or helps
+//! A substitute for a cause that the library does not know fits a part of it, grows beyond what is plausible, or helps
 //! on some clips and harms on others. What is left is then more than another engine's way of integrating leaves.
 
 use super::ends;
 use super::gap::Typical;
 use crate::answer::diagnosis::{SensorGap, Sensors};
 use crate::diagnose::criteria::{
-    DOUBTFUL, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, OBJECT_EXCESS,
-    OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, PLAIN_IN_JOINTS, PLAIN_IN_OBJECT, TURNS_WITHIN,
+    DOUBTFUL, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, LARGE_JOINTS_EXCESS, LARGE_OBJECT_EXCESS,
+    MOST_OF_IT, OBJECT_EXCESS, OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, TURNS_WITHIN,
 };
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use inference::likelihood::Evidence;
 use twin::effects::Role;
-
-/// A cause that stands out clearly may leave this share of the object's gap: after a bouncing hit no two engines agree. What
-/// unknown causes are mistaken for leaves two thirds.
-const MOST_OF_IT: f64 = 0.5;
 
 /// The gap in squared sigmas on clips that were not fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,7 +67,7 @@ impl Left {
 
     /// Whether the gap of the twin without any effect is so large that a substitute for its cause does not close it.
     pub fn is_plain(&self) -> bool {
-        self.before - self.floor > if self.of_object { PLAIN_IN_OBJECT } else { PLAIN_IN_JOINTS }
+        self.before - self.floor > if self.of_object { LARGE_OBJECT_EXCESS } else { LARGE_JOINTS_EXCESS }
     }
 
     /// How likely it is that nothing is there where no cause is seen.
@@ -83,6 +79,7 @@ impl Left {
     /// believed although it leaves a rough hit rough.
     pub fn too_much(&self, clear: bool) -> bool {
         let excess = self.after - self.floor;
+        // After a bouncing hit no two engines agree; what unknown causes are mistaken for leaves two thirds.
         let substitute = if clear && self.of_object { MOST_OF_IT } else { self.substitute };
         excess > self.numerics && excess > substitute * (self.before - self.floor)
     }
@@ -99,11 +96,11 @@ pub fn explained(before: f64, after: f64, floor: f64) -> f64 {
     if excess <= 0.0 { 0.0 } else { ((before - after) / excess).clamp(0.0, 1.0) }
 }
 
-/// An effect stronger than what is met in practice by more than this share of that range is no cause but a substitute for
+/// An effect stronger than what is plausible by more than this share of that range is no cause but a substitute for
 /// one.
-const BEYOND: f64 = 0.05;
+const MAX_BEYOND_RANGE: f64 = 0.05;
 
-/// Effects of a hypothesis that are stronger than what is met in practice, whatever of their intervals is true: what stopped at an
+/// Effects of a hypothesis that are stronger than what is plausible, whatever of their intervals is true: what stopped at an
 /// end of its search is at least as strong as that.
 pub fn implausible<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<usize> {
     let beyond = |effect: &usize| {
@@ -114,7 +111,7 @@ pub fn implausible<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -
             let outside = |(index, (value, ci90)): (usize, (&f64, &[f64; 2]))| {
                 let [low, high] = if stopped.contains(&(parameter.name, index)) { [*value; 2] } else { *ci90 };
                 let [lo, hi] = bench.library.robot().range(parameter, Some(index));
-                let room = BEYOND * (hi - lo);
+                let room = MAX_BEYOND_RANGE * (hi - lo);
                 // What fades out towards infinity is met from its strongest on.
                 let hi = if parameter.resting_value().is_infinite() { f64::INFINITY } else { hi };
                 low > hi + room || high < lo - room

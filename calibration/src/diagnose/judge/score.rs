@@ -10,7 +10,8 @@ use crate::diagnose::fit::left_out::shift_to;
 use inference::estimate::quadratic::value;
 use inference::likelihood::Evidence;
 use inference::likelihood::random_effects_scale::{Around, at_the_best_scale};
-use inference::statistics::median;
+use crate::diagnose::select::criteria::EFFECTS;
+use crate::diagnose::select::gain::Gain;
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,28 +20,8 @@ pub struct Predicted {
     pub clips: Vec<(usize, f64)>,
 }
 
-/// What one hypothesis is worth over another.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Advantage {
-    /// Sum over clips of the gain in ln of the likelihood, outstanding clips cut off [nats].
-    pub nats: f64,
-    /// Its standard error from the scatter between clips.
-    pub error: f64,
-    /// Share of the clips that gain.
-    pub share: f64,
-    /// Clip by clip, outstanding ones cut off [nats].
-    gains: Vec<f64>,
-}
-
-/// A clip's gain or loss counts up to so many times that of the clip in the middle, or up to so many nats: no clip decides
-/// alone, and none makes what all the others say uncertain.
-const OUTSTANDING: f64 = 5.0;
-const LEAST: f64 = 4.0;
-/// A linearisation is believed that the cost of a clip left out rises by no more than this.
-const DOUBTED: f64 = 100.0;
-
-/// What would take more than so many times the clips at hand is no promise.
-const MOST_TIMES: f64 = 6.0;
+/// A linearisation is believed that the cost of a clip left out rises by no more than this [deviance].
+const MAX_LINEAR_RISE: f64 = 100.0;
 
 /// Predicts training and choosing clips.
 pub fn predict<E: Evidence>(
@@ -84,7 +65,7 @@ fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights:
         let form = &clip.reduced.form;
         let shift = shift_to(bench, hypothesis, &(&total - form));
         let linear = value(form, &all, &shift) + clip.reduced.volume;
-        let doubted = linear > clip.deviance() + DOUBTED;
+        let doubted = linear > clip.deviance() + MAX_LINEAR_RISE;
         let answer = if doubted { simulated(bench, hypothesis, (clip, &shift), weights) } else { None };
         (clip.clip, answer.unwrap_or(linear))
     };
@@ -109,49 +90,16 @@ impl Predicted {
         self.clips.iter().map(|(_, deviance)| deviance).sum()
     }
 
-    /// What this hypothesis is worth over another on the same clips.
-    pub fn over(&self, other: &Self) -> Advantage {
-        let mut gains: Vec<f64> = self.clips.iter().zip(&other.clips).map(|((_, a), (_, b))| 0.5 * (b - a)).collect();
-        let most = (OUTSTANDING * median(gains.iter().map(|gain| gain.abs())).unwrap_or(0.0)).max(LEAST);
-        gains.iter_mut().for_each(|gain| *gain = gain.clamp(-most, most));
-        let (nats, error) = sum(&gains);
-        let share = gains.iter().filter(|gain| **gain > 0.0).count() as f64 / gains.len() as f64;
-        Advantage { nats, error, share, gains }
-    }
-}
-
-impl Advantage {
-    /// How many clips judged.
-    pub fn clips(&self) -> usize {
-        self.gains.len()
+    /// What this hypothesis is worth over another on the same clips of one session.
+    pub fn over(&self, other: &Self) -> Gain {
+        let gains = self.gains(other).map(|(_, gain)| gain).collect();
+        Gain::of(vec![gains], EFFECTS.max_of_clip_nats)
     }
 
-    /// How many clips more would make it twice its error, gaining as those at hand do; `None` where more would prove nothing, at
-    /// most as many as there are five times over, or it is proven.
-    pub fn clips_more(&self) -> Option<usize> {
-        if self.nats <= 0.0 || self.nats > 2.0 * self.error {
-            return None;
-        }
-        // The sum grows with the number of clips, its error with the root of it.
-        let count = self.clips() as f64;
-        let needed = count * (2.0 * self.error / self.nats).powi(2);
-        (needed <= MOST_TIMES * count).then(|| (needed - count).ceil().max(1.0) as usize)
+    /// By how much each clip is likelier than under another hypothesis [nats].
+    pub fn gains<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = (usize, f64)> + 'a {
+        self.clips.iter().zip(&other.clips).map(|((clip, own), (_, its))| (*clip, 0.5 * (its - own)))
     }
-
-    /// By how much more this is worth than another on the same clips, and the standard error of that from the scatter of the
-    /// difference between clips [nats]: what two hypotheses gain alike on a clip says nothing about which is right.
-    pub fn beyond(&self, other: &Self) -> (f64, f64) {
-        sum(&self.gains.iter().zip(&other.gains).map(|(a, b)| a - b).collect::<Vec<_>>())
-    }
-}
-
-/// Sum, and its standard error.
-fn sum(gains: &[f64]) -> (f64, f64) {
-    let count = gains.len() as f64;
-    let total: f64 = gains.iter().sum();
-    let mean = total / count;
-    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    (total, (variance * count).sqrt())
 }
 
 #[cfg(test)]
@@ -166,11 +114,11 @@ mod tests {
         let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
         on_strokes((&cell, &world), |bench, even| {
             let mut fit = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-            let told = |fit: &Hypothesis| predict(bench, fit, &[], even).expect("strokes").clips[0].1;
-            let nearly_straight = told(&fit);
+            let left_out = |fit: &Hypothesis| predict(bench, fit, &[], even).expect("strokes").clips[0].1;
+            let nearly_straight = left_out(&fit);
             // As if the first clip lay on an edge: at the point everything is steep, and a step away nothing is.
             fit.fitted[0].reduced.form.view_mut((1, 1), (fit.free.len(), fit.free.len())).fill_diagonal(1e12);
-            assert!((told(&fit) / nearly_straight - 1.0).abs() < 0.5, "{} {nearly_straight}", told(&fit));
+            assert!((left_out(&fit) / nearly_straight - 1.0).abs() < 0.5, "{} {nearly_straight}", left_out(&fit));
         });
     }
 
@@ -191,8 +139,8 @@ mod tests {
             Predicted { clips }.over(&before)
         };
         let [better, worse] = [over([40.0, 10.0, 60.0, 25.0, 55.0, 20.0]), over([38.0, 8.5, 57.5, 23.0, 53.0, 18.0])];
-        let (nats, error) = better.beyond(&worse);
-        assert!((nats - 12.0).abs() < 1e-9 && error < 1.0 && better.error > 40.0, "{nats} {error}");
+        let ahead = better.beyond(&worse);
+        assert!((ahead.nats - 12.0).abs() < 1e-9 && ahead.error < 1.0 && better.error > 40.0, "{ahead:?}");
     }
 
     #[test]

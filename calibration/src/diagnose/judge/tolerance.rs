@@ -5,7 +5,7 @@ use shared_mem::cell::Tolerance;
 /// Torques along a measured motion are predicted no better than this where cell.toml says nothing [N m]: accelerations are slopes of
 /// smoothed velocities. Sessions of another engine with nothing wrong leave 0.23, identified models of real Pandas 0.1 to 0.4
 /// (Gaz et al. 2019).
-const TORQUE: f64 = 0.3;
+const TORQUE_NM: f64 = 0.3;
 
 /// How large a gap is in units of the hand; `None` where that was not measured.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -20,7 +20,7 @@ pub(in crate::diagnose) struct Measured {
 
 /// Whether all that was measured lies within the tolerance.
 pub(in crate::diagnose) fn holds(tolerance: &Tolerance, measured: Measured) -> bool {
-    let torque = Some(tolerance.torque.unwrap_or(TORQUE));
+    let torque = Some(tolerance.torque.unwrap_or(TORQUE_NM));
     let pairs = [(measured.joints, tolerance.joint), (measured.torques, torque), (measured.object, tolerance.position)];
     let mut known = pairs.into_iter().filter_map(|(gap, most)| Some((gap?, most.unwrap_or(0.0)))).peekable();
     known.peek().is_some() && known.all(|(gap, most)| gap < most)

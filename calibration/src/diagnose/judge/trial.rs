@@ -2,38 +2,32 @@
 
 use super::closing::closes;
 use super::gap::{Residuals, Typical};
-use super::score::{Advantage, Predicted, predict};
-use crate::diagnose::criteria::OBJECT_EXCESS;
+use super::score::{Predicted, predict};
+use crate::diagnose::criteria::{ALIKE_SHARE, MOST_OF_IT, OBJECT_EXCESS};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Library;
+use crate::diagnose::select::criteria::EFFECTS;
+use crate::diagnose::select::gain::Gain;
 use inference::admit::Split;
 use inference::likelihood::Evidence;
 
-/// A new effect must be worth at least this [nats], more than twice its error, and more than its numbers cost.
-pub(in crate::diagnose) const LEAST: f64 = 4.0;
-/// ... of the arm more than this for each of its residuals: there are so many that the least numerics add up.
-pub(in crate::diagnose) const WORTHWHILE: f64 = 0.0025;
-/// ... and close at least this share of the gap: what helps only beside numbers that clips have of their own is no cause.
-pub const CLOSES: f64 = 0.1;
-/// ... unless it closes so much of the gap and predicts so many of the clips better that one which it predicts worse does
-/// not matter: 11 of 12 clips do not agree by chance (p = 0.003).
-pub(in crate::diagnose) const PLAIN: f64 = 0.3;
-pub(in crate::diagnose) const NEARLY_ALL: f64 = 0.85;
-/// An advantage of so many of its errors is no chance.
-const CLEAR: f64 = 3.5;
-/// More than half of a gap is most of it.
-const MOST_OF_IT: f64 = 0.5;
+/// An effect on the arm must be worth more than this for each of its residuals [nats]: there are so many that the least numerics add up.
+pub(in crate::diagnose) const MIN_NATS_PER_ROW: f64 = 0.0025;
+/// A cause closes more than this share of the gap: what helps only beside nuisance parameters of clips is none.
+pub const MIN_SHARE_CLOSED: f64 = 0.1;
+/// Of one that closes so much of the gap, and predicts nearly all clips better, one that it predicts worse does not matter.
+pub(in crate::diagnose) const LARGE_SHARE_CLOSED: f64 = 0.3;
+/// A gain of so many of its standard errors is no chance.
+const NO_CHANCE_SIGMAS: f64 = 3.5;
 /// An effect that leads is worth this share more than others: two effects of nearly the same worth do the same.
-const AHEAD: f64 = 0.2;
-/// ... and what more numbers make of that difference by this share of the gain: friction at rest is every engine's own.
-const OWN_SHARE: f64 = 1e-3;
-/// A trial comes as near as another where its fit goes this share of the other's way.
-const AS_NEAR: f64 = 0.5;
-/// Where clips have numbers of their own, which hide what a candidate closes from the likelihood, one that has more numbers
-/// than another must close this much more of the gap.
-const MORE: f64 = 0.04;
+const LEAD_SHARE: f64 = 0.2;
+/// More parameters make a gain larger by this share whatever acts: friction at rest is every engine's own.
+const NUMERICS_OF_GAIN: f64 = 1e-3;
+/// Where nuisance parameters of clips hide what a candidate closes from the likelihood, one that has more parameters than another must
+/// close this much more of the gap.
+const CLOSED_BY_MORE_PARAMETERS: f64 = 0.04;
 
 /// A candidate tried on top of a hypothesis.
 #[derive(Debug, Clone)]
@@ -41,35 +35,40 @@ pub struct Trial {
     /// What the score test said.
     pub scored: Scored,
     /// Fitted, where that was worth it.
-    pub fitted: Option<(Hypothesis, Advantage)>,
+    pub fitted: Option<(Hypothesis, Gain)>,
     /// [`closes`]: how much of the gap.
     pub closes: f64,
-    /// Whether clips have numbers of their own.
+    /// Whether clips have nuisance parameters.
     pub own_numbers: bool,
 }
 
 impl Trial {
     /// Whether enough of the gap closes with it for a cause, however much better the clips are predicted.
     pub fn is_cause(&self) -> bool {
-        self.closes > CLOSES
+        self.closes > MIN_SHARE_CLOSED
     }
 
-    /// What it is worth as fitted [nats]; 0 where it was not.
+    /// What it is worth, where it was fitted.
+    pub fn gain(&self) -> Option<&Gain> {
+        self.fitted.as_ref().map(|(_, gain)| gain)
+    }
+
+    /// The same [nats]; 0 where it was not.
     pub(in crate::diagnose) fn nats(&self) -> f64 {
-        self.fitted.as_ref().map_or(0.0, |(_, advantage)| advantage.nats)
+        self.gain().map_or(0.0, |gain| gain.nats)
     }
 
     /// Whether another does the same with fewer numbers: what is better about this one is no more than engines differ by.
     pub fn is_outdone_by(&self, other: &Self) -> bool {
-        let (Some((_, mine)), Some((_, its))) = (&self.fitted, &other.fitted) else { return false };
-        let alike = mine.nats - its.nats < LEAST.max(OWN_SHARE * its.nats);
+        let (Some(mine), Some(its)) = (self.gain(), other.gain()) else { return false };
+        let alike = mine.nats - its.nats < EFFECTS.min_gain_nats.max(NUMERICS_OF_GAIN * its.nats);
         other.scored.cost < self.scored.cost && alike && !self.closes_more_than(other)
     }
 
     /// Whether it closes so much more of the gap that its additional numbers are worth it although clips are predicted as well
     /// without them.
     pub fn closes_more_than(&self, other: &Self) -> bool {
-        self.own_numbers && self.closes > other.closes + MORE
+        self.own_numbers && self.closes > other.closes + CLOSED_BY_MORE_PARAMETERS
     }
 }
 
@@ -104,7 +103,7 @@ pub struct Found {
 impl Found {
     /// For every step, how many times what the search left of an arm's clips exceeds what was taken for noise in it, at least
     /// 1: so many times less do differences between candidates say. Weights come from slopes, with all candidates at once; a
-    /// real arm deviates far more under all that is named. Clips with numbers of their own take that up.
+    /// real arm deviates far more under all that is named. Clips with nuisance parameters take that up.
     pub fn overdispersion<E: Evidence>(&self, bench: &Bench<'_, E>) -> Vec<f64> {
         let clips: Vec<usize> = self.last.fitted.iter().map(|clip| clip.clip).collect();
         let left = (bench.scatter.count() == 0).then(|| Residuals::at(bench, &self.last, &clips)).flatten();
@@ -126,35 +125,27 @@ impl Found {
     }
 }
 
-/// Whether an advantage is enough for `cost` more numbers.
-pub fn convincing(advantage: &Advantage, cost: usize) -> bool {
-    let price = LEAST.max(cost as f64);
-    advantage.nats > price && advantage.nats > 2.0 * advantage.error && advantage.share > 0.5
-}
-
-/// Advantage less what numbers gain by chance: what trials are ranked by.
-pub fn net(advantage: &Advantage, cost: usize) -> f64 {
-    advantage.nats - 0.5 * cost as f64
-}
-
 impl Step {
     /// The trial that is worth most among those worth it.
-    pub fn best<E: Evidence>(&self, bench: &Bench<'_, E>) -> Option<(&Trial, &Hypothesis, &Advantage)> {
-        let convincing_ones: Vec<(&Trial, &Hypothesis, &Advantage)> = (self.trials.iter())
+    pub fn best<E: Evidence>(&self, bench: &Bench<'_, E>) -> Option<(&Trial, &Hypothesis, &Gain)> {
+        let convincing_ones: Vec<(&Trial, &Hypothesis, &Gain)> = (self.trials.iter())
             .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
             .filter(|(trial, _, advantage)| {
                 let of_arm = bench.library.candidates[trial.scored.candidate].is_of_arm();
-                let (much, nearly_all) = (trial.closes > PLAIN, advantage.share > NEARLY_ALL);
+                let (much, nearly_all) = (trial.closes > LARGE_SHARE_CLOSED, advantage.in_nearly_all());
                 // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing.
                 let rough = !of_arm && !self.object_gap();
                 let shown = !rough || (much && self.is_alone(bench.library, trial.scored.candidate));
                 // ... and beside a cause that was found before, a gain on nearly all of them neither.
-                let plain = much && nearly_all && advantage.nats > LEAST && (shown || self.from.effects.is_empty());
-                (convincing(advantage, trial.scored.cost) && shown) || plain
+                let plain = much
+                    && nearly_all
+                    && advantage.nats > EFFECTS.min_gain_nats
+                    && (shown || self.from.effects.is_empty());
+                (EFFECTS.proves(advantage, trial.scored.cost) && shown) || plain
             })
             .filter(|(trial, _, advantage)| {
                 let of_arm = bench.library.candidates[trial.scored.candidate].is_of_arm();
-                !of_arm || advantage.nats > WORTHWHILE * self.arm_rows as f64
+                !of_arm || advantage.nats > MIN_NATS_PER_ROW * self.arm_rows as f64
             })
             .filter(|(trial, _, _)| trial.is_cause())
             .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
@@ -162,23 +153,26 @@ impl Step {
             .collect();
         let simplest =
             |(trial, ..): &&(&Trial, _, _)| !convincing_ones.iter().any(|(other, ..)| trial.is_outdone_by(other));
-        let worth = |(trial, _, advantage): &(&Trial, _, &Advantage)| net(advantage, trial.scored.cost);
+        let worth = |(trial, _, advantage): &(&Trial, _, &Gain)| advantage.net(trial.scored.cost);
         convincing_ones.iter().filter(simplest).max_by(|a, b| worth(a).total_cmp(&worth(b))).copied()
     }
 
-    /// Notes a fit of a trial with what it predicts and closes.
-    pub(in crate::diagnose) fn judge<E: Evidence>(
-        &mut self,
+    /// The same with fits of trials, at their places, judged by what they predict and close.
+    pub(in crate::diagnose) fn with_fits<E: Evidence>(
+        mut self,
         bench: &Bench<'_, E>,
         split: &Split,
-        place: usize,
-        fit: Hypothesis,
-    ) {
-        if let Some(ahead) = predict(bench, &fit, &split.choose, &self.weights) {
-            let closes = closes(bench, split, &self.whole, [&self.from, &fit]);
-            let trial = &mut self.trials[place];
-            (trial.closes, trial.fitted) = (closes, Some((fit, ahead.over(&self.predicted))));
+        fits: impl IntoIterator<Item = (usize, Hypothesis)>,
+    ) -> Self {
+        for (place, fit) in fits {
+            if let Some(predicted) = predict(bench, &fit, &split.choose, &self.weights) {
+                let closes = closes(bench, split, &self.whole, [&self.from, &fit]);
+                let gain = predicted.over(&self.predicted);
+                let trial = &mut self.trials[place];
+                (trial.closes, trial.fitted) = (closes, Some((fit, gain)));
+            }
         }
+        self
     }
 
     /// Whether the object's gap is larger than in strokes of another engine with nothing wrong.
@@ -186,52 +180,55 @@ impl Step {
         self.left.iter().any(|group| group.of_object && group.mean_square - group.floor > OBJECT_EXCESS.value)
     }
 
+    /// The trial of a candidate.
+    pub fn trial(&self, candidate: usize) -> Option<&Trial> {
+        self.trials.iter().find(|trial| trial.scored.candidate == candidate)
+    }
+
     /// Whether a trial stands out: nearly all clips speak for it, far beyond chance, and for no other effect half as much.
     pub fn is_clear(&self, library: &Library, candidate: usize) -> bool {
-        let own = self.trials.iter().find(|trial| trial.scored.candidate == candidate);
-        let advantage = own.and_then(|trial| trial.fitted.as_ref()).map(|(_, advantage)| advantage);
-        let clear = |a: &Advantage| a.share > NEARLY_ALL && a.nats > CLEAR * a.error;
-        advantage.is_some_and(clear) && self.is_alone(library, candidate)
+        let clear = |gain: &Gain| gain.in_nearly_all() && gain.nats > NO_CHANCE_SIGMAS * gain.error;
+        self.trial(candidate).and_then(Trial::gain).is_some_and(clear) && self.is_alone(library, candidate)
     }
 
     /// Whether a trial leads: as clear as one that stands out, and ahead of every other cause that does not look like it, by half of
     /// what it is worth, or by a fifth and clip by clip far beyond chance.
     pub fn leads(&self, library: &Library, candidate: usize) -> bool {
-        let Some(trial) = self.trials.iter().find(|trial| trial.scored.candidate == candidate) else { return false };
-        let Some((_, own)) = trial.fitted.as_ref() else { return false };
+        let Some(trial) = self.trial(candidate) else { return false };
+        let Some(own) = trial.gain() else { return false };
         // Where every clip gains and most of the gap closes, the scatter between gains says how unequal clips are.
         let in_all = own.share == 1.0 && trial.closes > MOST_OF_IT;
-        if own.share <= NEARLY_ALL || !in_all && own.nats <= CLEAR * own.error {
+        if !own.in_nearly_all() || !in_all && own.nats <= NO_CHANCE_SIGMAS * own.error {
             return false;
         }
-        let ahead_of = |trial: &Trial| {
-            let (beyond, error) = trial.fitted.as_ref().map_or((f64::INFINITY, 0.0), |(_, other)| own.beyond(other));
-            beyond > CLEAR * error && beyond > AHEAD * own.nats
+        let ahead_of = |other: &Trial| {
+            let beyond = other.gain().map(|other| own.beyond(other));
+            beyond.is_none_or(|by| by.nats > NO_CHANCE_SIGMAS * by.error && by.nats > LEAD_SHARE * own.nats)
         };
-        let others = self.trials.iter().filter(|trial| trial.scored.candidate != candidate && trial.is_cause());
-        let mut rivals = others
-            .filter(|other| !library.look_alike(candidate, other.scored.candidate) && self.comes_as_near(other, trial));
-        self.is_alone(library, candidate) || rivals.all(ahead_of)
+        let mut near = self.causes_unlike(library, candidate).filter(|other| self.comes_as_near(other, trial));
+        self.is_alone(library, candidate) || near.all(ahead_of)
+    }
+
+    /// The other effects that could be the cause and are not known to look like a candidate.
+    fn causes_unlike(&self, library: &Library, candidate: usize) -> impl Iterator<Item = &Trial> {
+        let unlike = move |other: usize| other != candidate && !library.look_alike(candidate, other);
+        self.trials.iter().filter(move |trial| trial.is_cause() && unlike(trial.scored.candidate))
     }
 
     /// Whether a trial's fit goes as much of the way from what clips cost without it to what they cost with another, on a
     /// logarithmic scale: an effect after which next to nothing is left of an arm's gap has no equal in one that leaves most of
-    /// it, however unequal clips are. Where clips have numbers of their own, these hide it, and it is not asked.
+    /// it, however unequal clips are. Where clips have nuisance parameters, these hide it, and it is not asked.
     pub(in crate::diagnose) fn comes_as_near(&self, trial: &Trial, other: &Trial) -> bool {
         let without = self.from.deviance();
         let way = |trial: &Trial| trial.fitted.as_ref().map_or(0.0, |(fit, _)| (without / fit.deviance()).ln());
-        trial.own_numbers || way(trial) > AS_NEAR * way(other)
+        trial.own_numbers || way(trial) > ALIKE_SHARE * way(other)
     }
 
     /// Whether no other effect that could be the cause is worth half as much, but for those that are known to look alike:
     /// that some of them act stands out even where it does not show which.
     fn is_alone(&self, library: &Library, candidate: usize) -> bool {
-        let looks_alike = |trial: &&Trial| library.look_alike(candidate, trial.scored.candidate);
-        let worth = |trial: &Trial| trial.fitted.as_ref().map(|(_, advantage)| net(advantage, trial.scored.cost));
-        let (own, others): (Vec<&Trial>, Vec<&Trial>) =
-            self.trials.iter().partition(|trial| trial.scored.candidate == candidate);
-        let rivals = others.into_iter().filter(|trial| trial.is_cause() && !looks_alike(trial));
-        let next = rivals.filter_map(worth).fold(0.0, f64::max);
-        own.into_iter().find_map(worth).is_some_and(|own| next < 0.5 * own)
+        let worth = |trial: &Trial| trial.gain().map(|gain| gain.net(trial.scored.cost));
+        let next = self.causes_unlike(library, candidate).filter_map(worth).fold(0.0, f64::max);
+        self.trial(candidate).and_then(worth).is_some_and(|own| next < ALIKE_SHARE * own)
     }
 }

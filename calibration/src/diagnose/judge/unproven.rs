@@ -1,9 +1,10 @@
 //! An effect that predicts clips better and closes a real part of the gap, but not in enough clips to be no chance: what more
 //! clips would prove.
 
-use super::trial::{Found, PLAIN, Trial, convincing};
+use super::trial::{Found, LARGE_SHARE_CLOSED, Trial};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use inference::likelihood::Evidence;
+use crate::diagnose::select::criteria::EFFECTS;
 
 /// An effect that is likely, and not proven.
 pub(in crate::diagnose) struct Unproven<'a> {
@@ -31,13 +32,13 @@ pub(in crate::diagnose) fn unproven<'a, E: Evidence>(
 ) -> Option<Unproven<'a>> {
     let step = found.steps.first().filter(|_| found.last.effects.is_empty())?;
     let one = |trial: &'a Trial| {
-        let (fit, advantage) = trial.fitted.as_ref()?;
-        let more =
-            advantage.clips_more().filter(|_| trial.closes > PLAIN && !convincing(advantage, trial.scored.cost))?;
+        let (fit, gain) = trial.fitted.as_ref()?;
+        let open = trial.closes > LARGE_SHARE_CLOSED && !EFFECTS.proves(gain, trial.scored.cost);
+        let more = gain.clips_more().filter(|_| open)?;
         let real =
             !bench.negligible(trial.scored.candidate, &fit.full) && !bench.is_convention(trial.scored.candidate, fit);
-        let clips = cut.unwrap_or(advantage.clips());
-        real.then(|| Unproven { trial, fit, clips, more: (more * clips).div_ceil(advantage.clips()) })
+        let clips = cut.unwrap_or(gain.clips());
+        real.then(|| Unproven { trial, fit, clips, more: (more * clips).div_ceil(gain.clips()) })
     };
     step.trials.iter().filter_map(one).max_by(|a, b| a.trial.nats().total_cmp(&b.trial.nats()))
 }

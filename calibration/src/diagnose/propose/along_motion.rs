@@ -7,7 +7,7 @@
 //! but the stiffness follows by linear least squares. The stiffness hardly shows there, since slow motion tells ratios alone; it is
 //! taken where the simulated clips cost least, each joint by itself.
 
-use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use super::Around;
 use crate::diagnose::known_gains;
 use crate::diagnose::library::{Candidate, Library};
 use inference::estimate::Unknown;
@@ -21,31 +21,26 @@ use twin::arm::JointState;
 use twin::effects::Effects;
 
 /// Stiffnesses are tried at these powers of two times the middle of their range.
-const POWERS: RangeInclusive<i32> = -4..=4;
+const STIFFNESS_POWERS: RangeInclusive<i32> = -4..=4;
 /// A joint moves that is faster [rad/s]: the speed that half an encoder's step of a hobby servo (1.5 mrad) seems to be within the
 /// 80 ms over which motion is smoothed, three times over.
-const MOVES: f64 = 0.03;
+const MIN_SPEED: f64 = 0.03;
 /// So many moments for each number at least.
-const ENOUGH: usize = 10;
+const MIN_MOMENTS_PER_NUMBER: usize = 10;
 /// Least squares are solved so often, moments weighed anew each time by how far they were off.
-const TURNS: usize = 15;
+const REWEIGHTINGS: usize = 15;
 /// Beyond so many typical deviations a moment counts less and less (Cauchy's weights, with their usual constant; Holland and Welsch
 /// 1977).
-const FAR: f64 = 2.385;
+const CAUCHY_SCALE: f64 = 2.385;
 
 /// Numbers at which the fit of a candidate begins; `None` where it is no dry friction, the gains are known, or the law is another.
-pub(in crate::diagnose) fn start<E: Likelihood>(
-    bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis<E::Own>, &[f64]),
-    candidate: &Candidate,
-) -> Option<Vec<f64>> {
-    let library = bench.library;
+pub(in crate::diagnose) fn start<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate) -> Option<Vec<f64>> {
+    let (library, from) = (at.bench.library, at.from);
     let joints = Joint::all(library, candidate);
     if joints.is_empty() {
         return None;
     }
-    let clips = from.clips();
-    let moments: Vec<Moment> = clips.par_iter().flat_map(|clip| bench.evidence.following(*clip)).collect();
+    let moments: Vec<Moment> = from.clips().par_iter().flat_map(|clip| at.bench.evidence.following(*clip)).collect();
     if moments.is_empty() {
         return None;
     }
@@ -55,39 +50,24 @@ pub(in crate::diagnose) fn start<E: Likelihood>(
         solved.flatten().for_each(|(number, value)| full[number] = value);
         full
     };
-    let tried: Vec<Vec<f64>> = POWERS.map(with).collect();
-    let costs = tried.iter().map(|full| of_joints(bench, from, (full, weights)));
-    let costs: Vec<Vec<f64>> = costs.take_while(|_| !bench.interrupt.asked()).collect();
+    let tried: Vec<Vec<f64>> = STIFFNESS_POWERS.map(with).collect();
+    let costs = tried.iter().map(|full| of_joints(at, full));
+    let costs: Vec<Vec<f64>> = costs.take_while(|_| !at.bench.interrupt.asked()).collect();
     let mut full = from.full.clone();
     for joint in &joints {
         let cost = |power: &usize| costs[*power].get(joint.place).copied().unwrap_or(f64::INFINITY);
         let best = (0..costs.len()).min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
         joint.numbers().for_each(|number| full[number] = tried[best][number]);
     }
-    Some(sticking(bench, (from, weights), candidate, full))
-}
-
-/// The numbers, with what the candidate holds while it is searched at its lower end where that costs less: a joint that creeps
-/// leaves within seconds what one that sticks keeps.
-fn sticking<E: Likelihood>(
-    bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis<E::Own>, &[f64]),
-    candidate: &Candidate,
-    full: Vec<f64>,
-) -> Vec<f64> {
-    let mut held = full.clone();
-    candidate.held.iter().for_each(|number| held[*number] = bench.library.unknowns[*number].lower);
-    let clips = from.clips();
-    let cost = |full: &[f64]| bench.plain_cost(&clips, full, weights).unwrap_or(f64::INFINITY);
-    if cost(&held) < cost(&full) { held } else { full }
+    // A joint that creeps leaves within seconds what one that sticks keeps: what is held while it is searched at its lower end.
+    let mut sticking = full.clone();
+    candidate.held.iter().for_each(|number| sticking[*number] = library.unknowns[*number].lower);
+    Some(if at.cost(&sticking) < at.cost(&full) { sticking } else { full })
 }
 
 /// What the clips of a hypothesis cost in the channels of each joint at other numbers.
-fn of_joints<E: Likelihood>(
-    bench: &Bench<'_, E>,
-    from: &Hypothesis<E::Own>,
-    (full, weights): (&[f64], &[f64]),
-) -> Vec<f64> {
+fn of_joints<E: Likelihood>(at: &Around<'_, E>, full: &[f64]) -> Vec<f64> {
+    let Around { bench, from, weights } = at;
     let channels = bench.evidence.channels();
     let dof = channels.iter().filter_map(|channel| channel.joint).max().map_or(0, |last| last + 1);
     let of_clip = |clip: usize| {
@@ -140,8 +120,8 @@ impl Joint {
     /// The joint's numbers at one stiffness; `None` where it hardly moved.
     fn solved(&self, library: &Library, (full, moments): (&[f64], &[Moment]), power: i32) -> Option<Vec<(usize, f64)>> {
         let joint = self.place;
-        let moving: Vec<&Moment> = moments.iter().filter(|moment| moment.state.dq[joint].abs() > MOVES).collect();
-        if moving.len() < ENOUGH * (1 + self.taken.len()) {
+        let moving: Vec<&Moment> = moments.iter().filter(|moment| moment.state.dq[joint].abs() > MIN_SPEED).collect();
+        if moving.len() < MIN_MOMENTS_PER_NUMBER * (1 + self.taken.len()) {
             return None;
         }
         let Unknown { lower, upper, .. } = library.unknowns[self.stiffness];
@@ -210,14 +190,14 @@ fn is_dry_friction(library: &Library, candidate: &Candidate, (joint, size): (usi
         state.dq[joint] = dq;
         effects.arm.taken(joint, &state, 1.0)
     };
-    at(MOVES) > 0.0 && at(-MOVES) < 0.0 && at(2.0 * MOVES) < 1.5 * at(MOVES)
+    at(MIN_SPEED) > 0.0 && at(-MIN_SPEED) < 0.0 && at(2.0 * MIN_SPEED) < 1.5 * at(MIN_SPEED)
 }
 
 /// Least squares in which what is far off counts less; `None` where the columns do not tell their coefficients.
 fn robust(columns: &DMatrix<f64>, wanted: &DVector<f64>) -> Option<DVector<f64>> {
     let mut weights = DVector::from_element(wanted.len(), 1.0);
     let mut found = None;
-    for _ in 0..TURNS {
+    for _ in 0..REWEIGHTINGS {
         let weighed = DMatrix::from_fn(columns.nrows(), columns.ncols(), |i, k| weights[i] * columns[(i, k)]);
         let mut square = weighed.transpose() * columns;
         // A joint that hardly turned tells its weight's constant from the cosine by nothing but rounding.
@@ -229,7 +209,7 @@ fn robust(columns: &DMatrix<f64>, wanted: &DVector<f64>) -> Option<DVector<f64>>
         sizes.sort_by(f64::total_cmp);
         // The median of what is left, as a normal distribution's sigma.
         let typical = 1.4826 * sizes.get(sizes.len() / 2)?;
-        weights = left.map(|left| 1.0 / (1.0 + (left / (FAR * typical).max(f64::MIN_POSITIVE)).powi(2)));
+        weights = left.map(|left| 1.0 / (1.0 + (left / (CAUCHY_SCALE * typical).max(f64::MIN_POSITIVE)).powi(2)));
         found = Some(solution);
     }
     found
@@ -264,7 +244,7 @@ mod tests {
         let candidate = &library.candidates[library.find(candidate).expect("a candidate")];
         on_bench((&cell, &world), &library, |bench, even| {
             let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-            start(bench, (&baseline, even), candidate).map(|full| library.theta(&full))
+            start(&super::super::around(bench, (&baseline, even)), candidate).map(|full| library.theta(&full))
         })
     }
 

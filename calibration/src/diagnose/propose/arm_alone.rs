@@ -3,24 +3,23 @@
 //! the joints are compared there first, and few of them are taken on to the object.
 
 use super::screening::arm_gap_is_open;
-use super::starts;
-
+use super::{Around, Search, starts};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::effort::{FIRST_PASS, HEAT, LOOK, NEAR};
+use crate::diagnose::fit::effort::{NEAR_DEVIANCE, PROBE, REFINEMENT, SCREENING};
 use crate::diagnose::fit::{stages, undetermined};
 use crate::diagnose::judge::trial::Step;
 use crate::words::words;
 use inference::admit::Split;
+use crate::diagnose::select::multi_start::MultiStart;
 use inference::estimate::{ClipModel, Impossible};
 use inference::likelihood::arm::following::Moment;
 use inference::likelihood::random_effects::{RandomEffects, WithoutOwn};
 use inference::likelihood::{Channel, Evidence, Likelihood, Near, Reach, Row};
-use shared_mem::progress::Progress;
 
-/// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there.
-const NEAR_ON_ARM: f64 = 0.1;
+/// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there (a choice).
+const NEAR_ON_ARM_SHARE: f64 = 0.1;
 
-/// The same clips, rows and channels; residuals of the object are zero, and clips have no numbers of their own.
+/// The same clips, rows and channels; residuals of the object are zero, and clips have no nuisance parameters.
 pub struct ArmAlone<'a, E>(pub &'a E);
 
 impl<E: Evidence> ArmAlone<'_, E> {
@@ -32,67 +31,69 @@ impl<E: Evidence> ArmAlone<'_, E> {
     }
 }
 
-impl Step {
-    /// Fits trials of effects in the joints, at their `places`: to the arm's own channels first; those that explain these about
-    /// as well as the best of them are looked at once with the object as well. What an object does after it was hit a little
-    /// elsewhere is no judge of joints. `others`: trials that the caller fits next, for the bar.
-    pub(in crate::diagnose) fn fitted_to_the_arm_first<E: Evidence>(
-        &self,
-        bench: &Bench<'_, E>,
-        split: &Split,
-        (places, overlooked): (&[usize], bool),
-        refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
-        (bar, others): (&Progress, usize),
-    ) -> Vec<(usize, Hypothesis)> {
-        if places.is_empty() {
-            bar.stage(stages::FITS, others as u64);
-            return Vec::new();
-        }
-        let (evidence, weights) = (ArmAlone(bench.evidence), &self.weights);
-        let arm = evidence.bench(bench);
-        let fit = |effects: &[usize], full, effort| arm.fit((effects, full), &split.train, weights, None, effort);
-        // What the step extends, as the arm alone sees it.
-        let Some(from) = fit(&self.from.effects, self.from.full.clone(), LOOK) else { return Vec::new() };
-        let name = |place: usize| words(bench.library.candidates[self.trials[place].scored.candidate].effect.name);
-        bar.stage(stages::ARM_FITS, places.len() as u64);
-        let alone = |place: &usize| {
-            let scored = &self.trials[*place].scored;
-            let effects = [&self.from.effects[..], &[scored.candidate]].concat();
-            let starts = starts::kept(&arm, (&from, weights), scored, overlooked).into_iter();
-            let begun = starts.filter_map(|start| fit(&effects, start, HEAT));
-            let best = begun.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?;
-            Some((*place, fit(&effects, best.full, FIRST_PASS)?))
-        };
-        let unless_asked = |(done, place): (usize, &usize)| {
-            bar.show(done as u64, &format!("{}: {}", stages::ARM_FITS, name(*place)));
-            if bench.interrupt.asked() { None } else { alone(place) }
-        };
-        let all: Vec<(usize, Hypothesis<WithoutOwn>)> = places.iter().enumerate().filter_map(unless_asked).collect();
-        let best = all.iter().fold(&from, |best, (_, fit)| if fit.deviance() < best.deviance() { fit } else { best });
-        let near = best.deviance() + NEAR.max(NEAR_ON_ARM * (from.deviance() - best.deviance()));
-        let anew = if arm_gap_is_open(&self.whole, &self.left) { refined(&best.full) } else { None };
-        let with_object = |(place, alone): (usize, Hypothesis<WithoutOwn>)| {
-            let candidate = self.trials[place].scored.candidate;
-            let mut open = undetermined::sizes(&arm, &alone, candidate);
-            open.retain(|k| bench.library.joints[*k].is_none());
-            let object = |other: &Vec<f64>| bench.library.with_object_of(alone.full.clone(), other);
-            let starts = [Some(alone.full.clone()), anew.as_ref().map(object)].into_iter().flatten();
-            let look = |start: Vec<f64>| {
-                let full = starts::seen_by_the_object(bench, (&self.from, weights), start, &open);
-                bench.extend(&self.from, (candidate, full), &split.train, weights, LOOK)
-            };
-            let looks = starts.filter_map(look);
-            Some((place, looks.min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?))
-        };
-        let near: Vec<(usize, Hypothesis<WithoutOwn>)> =
-            all.into_iter().filter(|(_, alone)| alone.deviance() < near).collect();
-        bar.stage(stages::FITS, (near.len() + others) as u64);
-        let shown = |(done, one): (usize, (usize, Hypothesis<WithoutOwn>))| {
-            bar.show(done as u64, &format!("{}: {}", stages::FITS, name(one.0)));
-            with_object(one)
-        };
-        near.into_iter().enumerate().filter_map(shown).collect()
+/// Trials of effects in the joints, at their `places` in a step, fitted to the arm's own channels first; those that explain these about
+/// as well as the best of them are looked at once with the object as well. What an object does after it was hit a little
+/// elsewhere is no judge of joints. `others`: trials that the caller fits next, for the bar.
+pub(in crate::diagnose) fn fitted<E: Evidence>(
+    search: &Search<'_, E>,
+    step: &Step,
+    (places, overlooked): (&[usize], bool),
+    others: usize,
+) -> Vec<(usize, Hypothesis)> {
+    if places.is_empty() {
+        search.bar.stage(stages::FITS, others as u64);
+        return Vec::new();
     }
+    let (bench, evidence) = (search.bench, ArmAlone(search.bench.evidence));
+    let arm = evidence.bench(bench);
+    let (clips, weights) = (&search.split.train, &step.weights);
+    let fits = MultiStart { bench: &arm, effects: &step.from.effects, clips, weights, near: None };
+    // What the step extends, as the arm alone sees it.
+    let Some(from) = fits.fit(step.from.full.clone(), PROBE) else { return Vec::new() };
+    let around = Around { bench: &arm, from: &from, weights: &step.weights };
+    let label = |stage: &str, place: usize| {
+        stages::of(stage, bench.library.candidates[step.trials[place].scored.candidate].effect.name)
+    };
+    search.bar.stage(stages::ARM_FITS, places.len() as u64);
+    let alone = |(done, place): (usize, &usize)| {
+        search.bar.show(done as u64, &label(stages::ARM_FITS, *place));
+        let scored = (!bench.interrupt.asked()).then(|| &step.trials[*place].scored)?;
+        let effects = [&step.from.effects[..], &[scored.candidate]].concat();
+        let fits = MultiStart { bench: &arm, effects: &effects, clips, weights, near: None };
+        let best = fits.best(starts::kept(&around, scored, overlooked), SCREENING)?;
+        Some((*place, fits.fit(best.full, REFINEMENT)?))
+    };
+    let all: Vec<(usize, Hypothesis<WithoutOwn>)> = places.iter().enumerate().filter_map(alone).collect();
+    let best = all.iter().fold(&from, |best, (_, fit)| if fit.deviance() < best.deviance() { fit } else { best });
+    let near = best.deviance() + NEAR_DEVIANCE.max(NEAR_ON_ARM_SHARE * (from.deviance() - best.deviance()));
+    let anew = if arm_gap_is_open(&step.whole, &step.left) { (search.refined)(&best.full) } else { None };
+    let near: Vec<(usize, Hypothesis<WithoutOwn>)> =
+        all.into_iter().filter(|(_, alone)| alone.deviance() < near).collect();
+    search.bar.stage(stages::FITS, (near.len() + others) as u64);
+    let looked_at = |(done, (place, alone)): (usize, (usize, Hypothesis<WithoutOwn>))| {
+        search.bar.show(done as u64, &label(stages::FITS, place));
+        let candidate = step.trials[place].scored.candidate;
+        let mut open = undetermined::sizes(&arm, &alone, candidate);
+        open.retain(|k| bench.library.joints[*k].is_none());
+        Some((place, with_object(search, step, (&alone, &open), anew.as_deref())?))
+    };
+    near.into_iter().enumerate().filter_map(looked_at).collect()
+}
+
+/// A fit to the arm alone, looked at with the object: with that of the step, and with one found anew. `open`: numbers of its effect that
+/// the arm leaves open.
+fn with_object<E: Evidence>(
+    search: &Search<'_, E>,
+    step: &Step,
+    (alone, open): (&Hypothesis<WithoutOwn>, &[usize]),
+    anew: Option<&[f64]>,
+) -> Option<Hypothesis> {
+    let bench = search.bench;
+    let around = Around { bench, from: &step.from, weights: &step.weights };
+    let object = |other: &[f64]| bench.library.with_object_of(alone.full.clone(), other);
+    let starts = [Some(alone.full.clone()), anew.map(object)].into_iter().flatten();
+    let seen = starts.map(|start| starts::seen_by_the_object(&around, start, open));
+    search.fits(&alone.effects, &step.weights, &step.from).best(seen, PROBE)
 }
 
 impl<E: Evidence> ClipModel for ArmAlone<'_, E> {
@@ -150,7 +151,7 @@ impl<E: Evidence> Likelihood for ArmAlone<'_, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
+    use inference::admit::Split;
     use crate::diagnose::fit::effort::Effort;
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::judge::gap::Typical;
@@ -160,6 +161,7 @@ mod tests {
     use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
     use inference::likelihood::Group;
     use worlds::world::{Fault, Kind, World};
+    use shared_mem::progress::Progress;
 
     /// The baseline as it is hidden in a world.
     fn hidden_baseline(library: &Library, world: &World) -> Vec<f64> {
@@ -179,7 +181,7 @@ mod tests {
             own_numbers: true,
         };
         let step = Step {
-            from: bench.fit((&[], full), &[0, 1], even, None, LOOK).expect("a fit"),
+            from: bench.fit((&[], full), &[0, 1], even, None, PROBE).expect("a fit"),
             predicted: Predicted { clips: Vec::new() },
             trials: asked.iter().map(trial).collect(),
             weights: even.to_vec(),
@@ -212,13 +214,8 @@ mod tests {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
                 step.left = vec![group(false, arm), group(true, 100.0)];
                 step.whole = step.left.clone();
-                object(step.fitted_to_the_arm_first(
-                    bench,
-                    &split,
-                    (&[0], false),
-                    &anew,
-                    (&Progress::new("nothing", 1), 0),
-                ))
+                let search = Search { bench, split: &split, refined: &anew, bar: &Progress::new("nothing", 1) };
+                object(super::fitted(&search, &step, (&[0], false), 0))
             };
             assert_eq!(fitted(1.5), library.with_object_of(hidden.clone(), &wrong), "the arm is where it was");
             assert_eq!(fitted(50.0), hidden);
@@ -234,8 +231,9 @@ mod tests {
             let hidden = library.settings.numbers(&world.hidden);
             let asked = ["base_tilt", "joint_encoder_offset"].map(|name| library.find(name).expect("a candidate"));
             let (step, split) = step(bench, hidden_baseline(library, &world), even, &asked);
-            let bar = Progress::new("nothing", 1);
-            let found = step.fitted_to_the_arm_first(bench, &split, (&[0, 1], false), &|_: &[f64]| None, (&bar, 0));
+            let bar = &Progress::new("nothing", 1);
+            let search = Search { bench, split: &split, refined: &|_| None, bar };
+            let found = fitted(&search, &step, (&[0, 1], false), 0);
             let [(1, fit)] = &found[..] else { panic!("{} fits", found.len()) };
             let sizes = &library.candidates[asked[1]].sizes;
             let [turned, lifted] = [0, 1].map(|joint| (fit.full[sizes[joint]], hidden[sizes[joint]].expect("hidden")));
@@ -249,12 +247,13 @@ mod tests {
         let cell = shipped();
         let world = with_effect("joint_backlash", 40, Kind::Strokes, &cell);
         on_strokes((&cell, &world), |bench, even| {
-            assert!(bench.scatter.count() > 0, "strokes have numbers of their own");
+            assert!(bench.scatter.count() > 0, "strokes have nuisance parameters");
             let library = bench.library;
             let candidate = library.find("joint_backlash").expect("a candidate");
             let (step, split) = step(bench, hidden_baseline(library, &world), even, &[candidate]);
-            let bar = Progress::new("nothing", 1);
-            let found = step.fitted_to_the_arm_first(bench, &split, (&[0], true), &|_: &[f64]| None, (&bar, 0));
+            let bar = &Progress::new("nothing", 1);
+            let search = Search { bench, split: &split, refined: &|_| None, bar };
+            let found = fitted(&search, &step, (&[0], true), 0);
             let [(0, fit)] = &found[..] else { panic!("{} fits", found.len()) };
             assert_eq!(fit.effects, [candidate]);
             assert!(fit.deviance() < step.from.deviance(), "{} {}", fit.deviance(), step.from.deviance());

@@ -2,10 +2,10 @@
 //!
 //! | module | |
 //! |---|---|
-//! | `signatures` | every candidate's signature, linearised once |
-//! | `screening` | which of them are fitted |
-//! | `arm_alone` | effects in the joints, fitted to the arm first |
-//! | `starts`, `ripple`, `along_motion` | where a fit begins |
+//! | `signatures` | the score test of all candidates around a hypothesis |
+//! | `screening` | which of them are worth a fit |
+//! | `starts`, `ripple`, `along_motion` | where fits begin |
+//! | `arm_alone` | clips with an object as if only the arm had been recorded |
 
 pub mod along_motion;
 pub mod arm_alone;
@@ -13,3 +13,95 @@ pub mod ripple;
 pub mod screening;
 pub mod signatures;
 pub mod starts;
+
+use inference::admit::Split;
+use inference::likelihood::{Evidence, Likelihood};
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::shortlist::Scored;
+use crate::diagnose::library::Candidate;
+use crate::diagnose::select::multi_start::MultiStart;
+use shared_mem::progress::Progress;
+
+/// What every step of a search for effects is given.
+pub(in crate::diagnose) struct Search<'a, E> {
+    pub(in crate::diagnose) bench: &'a Bench<'a, E>,
+    pub(in crate::diagnose) split: &'a Split,
+    /// Numbers whose object is found anew under the effects in them; `None` where there is no object.
+    pub(in crate::diagnose) refined: &'a dyn Fn(&[f64]) -> Option<Vec<f64>>,
+    pub(in crate::diagnose) bar: &'a Progress,
+}
+
+impl<'a, E> Search<'a, E> {
+    /// Fits of effects to the clips for fitting, each clip's nuisance parameters from where `near` has them.
+    pub(in crate::diagnose) fn fits(
+        &'a self,
+        effects: &'a [usize],
+        weights: &'a [f64],
+        near: &'a Hypothesis,
+    ) -> MultiStart<'a, E>
+    where
+        E: Evidence,
+    {
+        MultiStart { bench: self.bench, effects, clips: &self.split.train, weights, near: Some(near) }
+    }
+
+    /// The same on another bench of the same clips.
+    pub(in crate::diagnose) fn on<F>(&self, bench: &'a Bench<'a, F>) -> Search<'a, F> {
+        Search { bench, split: self.split, refined: self.refined, bar: self.bar }
+    }
+}
+
+/// A hypothesis around which starts are looked for, on the clips that it was fitted to.
+pub(in crate::diagnose) struct Around<'a, E: Likelihood> {
+    pub(in crate::diagnose) bench: &'a Bench<'a, E>,
+    pub(in crate::diagnose) from: &'a Hypothesis<E::Own>,
+    pub(in crate::diagnose) weights: &'a [f64],
+}
+
+impl<E: Likelihood> Around<'_, E> {
+    fn candidate(&self, scored: &Scored) -> &Candidate {
+        &self.bench.library.candidates[scored.candidate]
+    }
+
+    /// The numbers with a candidate as strong as it is said.
+    fn begun(&self, scored: &Scored) -> Vec<f64> {
+        self.bench.begun(self.from.full.clone(), scored)
+    }
+
+    /// Numbers with one of them so many units of its probe from rest; `number`, and its value at one unit.
+    fn moved(&self, full: &[f64], (number, at_one): (usize, f64), units: f64) -> Vec<f64> {
+        let unknown = &self.bench.library.unknowns[number];
+        let mut moved = full.to_vec();
+        moved[number] = (unknown.start + units * (at_one - unknown.start)).clamp(unknown.lower, unknown.upper);
+        moved
+    }
+
+    /// What the clips cost at other numbers.
+    fn cost(&self, full: &[f64]) -> f64 {
+        self.bench.plain_cost(&self.from.clips(), full, self.weights).unwrap_or(f64::INFINITY)
+    }
+
+    /// Which numbers make the clips cost least, and how much, where that is less than `bound`. Of numbers that cost more
+    /// before all clips were asked the others are not.
+    fn cheapest(&self, numbers: impl IntoIterator<Item = Vec<f64>>, bound: f64) -> Option<(f64, Vec<f64>)> {
+        let (clips, mut best) = (self.from.clips(), None::<(f64, Vec<f64>)>);
+        for full in numbers {
+            if self.bench.interrupt.asked() {
+                break;
+            }
+            let bound = best.as_ref().map_or(bound, |(cost, _)| *cost);
+            if let Some(cost) = self.bench.plain_cost_below(&clips, &full, self.weights, bound) {
+                best = Some((cost, full));
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+fn around<'a, E: Likelihood>(
+    bench: &'a Bench<'a, E>,
+    (from, weights): (&'a Hypothesis<E::Own>, &'a [f64]),
+) -> Around<'a, E> {
+    Around { bench, from, weights }
+}

@@ -4,19 +4,19 @@
 //! slope leads from one to the other. So all orders are tried in steps that a fit can bridge, every joint by itself (a
 //! periodogram over the position instead of over time, by least squares: Lomb 1976).
 
-use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use inference::likelihood::{Likelihood, Reach};
+use super::Around;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
 /// Orders are this far apart [periods per turn]: half of it is a third of a period within a joint's travel of 1 rad.
-const APART: f64 = 4.0;
+const ORDER_STEP: f64 = 4.0;
 /// So many clips are looked at: a joint that turns through a radian or two in each tells its order from all others there,
 /// and every further one would cost two simulations an order.
-const CLIPS: usize = 2;
+const MAX_CLIPS: usize = 2;
 /// Strength at which the answer is looked at [N m].
-const PROBED: f64 = 0.05;
+const PROBE_NM: f64 = 0.05;
 
 /// Two columns against the residuals of one joint.
 #[derive(Debug, Clone, Copy, Default)]
@@ -35,20 +35,18 @@ impl Waves {
 
 /// Numbers with the candidate's ripple at the order, strength and phase that suit each joint best; `None` where the twin has
 /// no answer. `from`: what acts already, and the clips.
-pub(in crate::diagnose) fn start<E: Likelihood>(
-    bench: &Bench<'_, E>,
-    (from, weights): (&Hypothesis<E::Own>, &[f64]),
-    candidate: usize,
-) -> Option<Vec<f64>> {
+pub(in crate::diagnose) fn start<E: Likelihood>(at: &Around<'_, E>, candidate: usize) -> Option<Vec<f64>> {
+    let Around { bench, from, weights } = at;
     let ripple = &bench.library.candidates[candidate];
     let orders: Vec<usize> = ripple.alternatives.first()?.form.iter().map(|(k, _)| *k).collect();
     let phases: Vec<usize> =
         ripple.numbers.clone().filter(|k| !ripple.sizes.contains(k) && !orders.contains(k)).collect();
     let highest = bench.library.unknowns[*orders.first()?].upper;
-    let tried: Vec<f64> = (1..).map(|step| APART * f64::from(step)).take_while(|order| *order <= highest).collect();
-    let at = |order: f64, phase: f64| {
+    let tried: Vec<f64> =
+        (1..).map(|step| ORDER_STEP * f64::from(step)).take_while(|order| *order <= highest).collect();
+    let with = |order: f64, phase: f64| {
         let mut full = from.full.clone();
-        ripple.sizes.iter().for_each(|k| full[*k] = PROBED);
+        ripple.sizes.iter().for_each(|k| full[*k] = PROBE_NM);
         orders.iter().for_each(|k| full[*k] = order);
         phases.iter().for_each(|k| full[*k] = phase);
         full
@@ -63,13 +61,13 @@ pub(in crate::diagnose) fn start<E: Likelihood>(
             Some(out)
         };
         let waves = |order: &f64| {
-            let [sine, cosine] = [column(&at(*order, 0.0))?, column(&at(*order, FRAC_PI_2))?];
+            let [sine, cosine] = [column(&with(*order, 0.0))?, column(&with(*order, FRAC_PI_2))?];
             let mut joints = vec![Waves::default(); ripple.sizes.len()];
             for (row, place) in bench.evidence.rows(clip).iter().enumerate() {
                 let channel = &bench.evidence.channels()[place.channel];
                 let Some(joint) = channel.joint.and_then(|joint| joints.get_mut(joint)) else { continue };
                 let (weight, rest) = (weights[place.channel].powi(2), base[row]);
-                let moved = Vector2::new(sine[row] - rest, cosine[row] - rest) / PROBED;
+                let moved = Vector2::new(sine[row] - rest, cosine[row] - rest) / PROBE_NM;
                 joint.squares += moved * moved.transpose() * weight;
                 joint.product += moved * (rest * weight);
             }
@@ -77,7 +75,7 @@ pub(in crate::diagnose) fn start<E: Likelihood>(
         };
         tried.iter().map(waves).collect()
     };
-    let looked_at = &from.fitted[..from.fitted.len().min(CLIPS)];
+    let looked_at = &from.fitted[..from.fitted.len().min(MAX_CLIPS)];
     let clips: Vec<Vec<Vec<Waves>>> = looked_at.par_iter().map(|fitted| of_clip(fitted.clip)).collect::<Option<_>>()?;
     let mut full = from.full.clone();
     for (joint, size) in ripple.sizes.iter().enumerate() {
@@ -118,11 +116,11 @@ mod tests {
         let candidate = library.find("torque_ripple").expect("a candidate");
         let begun = on_bench((&cell, &world), &library, |bench, even| {
             let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-            start(bench, (&baseline, even), candidate).expect("numbers")
+            start(&super::super::around(bench, (&baseline, even)), candidate).expect("numbers")
         });
         let orders = library.candidates[candidate].alternatives[0].form.iter().map(|(k, _)| begun[*k]);
         for (joint, (found, order)) in orders.zip(order).enumerate() {
-            assert!((found - order).abs() < APART, "joint {joint}: {found} instead of {order}");
+            assert!((found - order).abs() < ORDER_STEP, "joint {joint}: {found} instead of {order}");
         }
     }
 }

@@ -1,27 +1,23 @@
 //! Which candidates are worth a fit.
 
-use crate::diagnose::criteria::OBJECT_EXCESS;
+use crate::diagnose::criteria::{ALIKE_SHARE, OBJECT_EXCESS};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::shortlist::{BY_CHANCE, Scored, TESTABLE};
+use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
 use crate::diagnose::judge::gap::Typical;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::trial::Step;
 use inference::likelihood::Evidence;
+use crate::diagnose::select::criteria::EFFECTS;
 use twin::effects::Stage;
 
-/// So many candidates are fitted at each step.
-const FITTED: usize = 5;
 /// An arm whose gap is smaller than this in squared sigmas is not the cause of what an object does.
-const QUIET: f64 = 0.5;
-/// Candidates whose signature explains less than this share of what the best one does are not fitted.
-const CLOSE: f64 = 0.1;
+const QUIET_ARM_EXCESS: f64 = 0.5;
 /// So many candidates are fitted beside them because they stand out at the least scatter: those whose signature explains
 /// this share of what the best one does there.
-const STANDING_OUT: usize = 2;
-const ALIKE: f64 = 0.5;
+const MAX_STANDING_OUT: usize = 2;
 /// An object's gap beyond this, half of what two engines differ by, has all effects on the slide fitted: which of them it is
 /// shows in how far fits get.
-const SLID: f64 = 0.5 * OBJECT_EXCESS.value;
+const SLIDE_EXCESS: f64 = 0.5 * OBJECT_EXCESS.value;
 
 /// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
 /// best first; of the others only partners that the best is easily taken for. While the arm has a gap of its own, only what the arm feels
@@ -39,7 +35,7 @@ pub(in crate::diagnose) fn to_fit<E: Evidence>(
         let group = left.iter().find(|group| group.of_object == of_object);
         group.map_or(0.0, |group| group.mean_square - group.floor)
     };
-    let quiet = left.len() > 1 && beyond(false) < QUIET;
+    let quiet = left.len() > 1 && beyond(false) < QUIET_ARM_EXCESS;
     let arm_open = arm_gap_is_open(whole, left);
     for of_arm in [true, false].into_iter().filter(|of_arm| if *of_arm { !quiet } else { !arm_open }) {
         let of_group = |s: &&Scored| {
@@ -50,12 +46,13 @@ pub(in crate::diagnose) fn to_fit<E: Evidence>(
         let Some(best) = group.first() else { continue };
         let likely = |s: &&&Scored| {
             let visible = !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s));
-            s.p < BY_CHANCE && s.gain > CLOSE * best.gain && visible
+            EFFECTS.promises((s.p, s.gain), best.gain) && visible
         };
         let partners = effect(best).confusable_with;
-        let first = group.iter().filter(likely).take(FITTED);
-        let confusable = (group.iter())
-            .filter(|s| partners.contains(&effect(s).name) && s.p < BY_CHANCE && s.gain > 0.5 * CLOSE * best.gain);
+        let first = group.iter().filter(likely).take(EFFECTS.max_fitted);
+        let confusable = group
+            .iter()
+            .filter(|s| partners.contains(&effect(s).name) && EFFECTS.promises((s.p, s.gain), 0.5 * best.gain));
         all.extend(first.chain(confusable).map(|s| s.candidate));
     }
     let more = |wanted: &dyn Fn(&Scored) -> bool| -> Vec<usize> {
@@ -65,7 +62,7 @@ pub(in crate::diagnose) fn to_fit<E: Evidence>(
     if arm_open {
         return all;
     }
-    if beyond(true) > SLID {
+    if beyond(true) > SLIDE_EXCESS {
         all.extend(more(&|s| effect(s).stage == Stage::Slide && !all.contains(&s.candidate)));
     }
     if beyond(true) > OBJECT_EXCESS.value {
@@ -89,9 +86,11 @@ pub(in crate::diagnose) fn seen_at_the_least_scatter<'a, E: Evidence>(
     let object: Vec<&Scored> = narrow.iter().filter(of_object).collect();
     let Some(best) = object.first() else { return Vec::new() };
     let likely = |s: &&&Scored| {
-        s.p < 0.01 && s.gain > ALIKE * best.gain && !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s))
+        s.p < 0.01
+            && s.gain > ALIKE_SHARE * best.gain
+            && !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s))
     };
-    object.iter().filter(likely).take(STANDING_OUT).copied().collect()
+    object.iter().filter(likely).take(MAX_STANDING_OUT).copied().collect()
 }
 
 /// Candidates on the arm that the score test passed over although a gap remains there that none of the others explains:
@@ -127,8 +126,8 @@ mod tests {
                 to_fit(bench, &from, &all, (&left, &left))
             };
             let slides = bench.library.candidates.iter().filter(|c| c.effect.stage == Stage::Slide).count();
-            assert_eq!(fitted(1.5 + 0.9 * SLID).len(), 0);
-            assert_eq!(fitted(1.5 + 1.1 * SLID).len(), slides);
+            assert_eq!(fitted(1.5 + 0.9 * SLIDE_EXCESS).len(), 0);
+            assert_eq!(fitted(1.5 + 1.1 * SLIDE_EXCESS).len(), slides);
             let beside = |stage| bench.library.candidates.iter().filter(|c| c.effect.stage == stage).count();
             let all_beyond = slides + beside(Stage::Hit) + beside(Stage::Camera);
             assert_eq!(

@@ -28,12 +28,7 @@ pub(in crate::diagnose) fn around<E: Evidence>(
 
 fn taken<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Signatures> {
     let mut swept = swept(bench, split, from, bar)?;
-    let mut weights = vec![1.0; bench.evidence.channels().len()];
-    // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
-    for _ in 0..2 {
-        let left = floor::richest_residuals(&swept, bench.evidence, bench.library, &weights).ok()?;
-        weights = floor::weights(bench.evidence, &left);
-    }
+    let weights = weights(bench, &[&swept])?;
     let scores = |swept: &Swept| {
         let size = 1 + swept.columns.len();
         let forms = swept.reduced(bench.evidence, &weights).ok()?;
@@ -45,6 +40,18 @@ fn taken<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, ba
     swept.scatter = bench.scatter.narrowed(random_effects_scale::MIN_SCALE);
     let narrow = scores(&swept)?;
     Some((weights, scored, narrow))
+}
+
+/// Factors on the channels under which what the richest model leaves in some sweeps looks like noise.
+pub(in crate::diagnose) fn weights<E: Evidence>(bench: &Bench<'_, E>, sweeps: &[&Swept]) -> Option<Vec<f64>> {
+    let mut weights = vec![1.0; bench.evidence.channels().len()];
+    // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
+    for _ in 0..2 {
+        let left = |swept: &&Swept| floor::richest_residuals(swept, bench.evidence, bench.library, &weights).ok();
+        let left: Option<Vec<_>> = sweeps.iter().map(left).collect();
+        weights = floor::weights(bench.evidence, &left?.concat());
+    }
+    Some(weights)
 }
 
 fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Swept> {

@@ -18,12 +18,11 @@ use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
 use shared_mem::theta::ObjectTheta;
 
-/// The way there, and the last steps.
-const WAY: Effort = Effort::of(8, Precision::Joints);
-const LAST: Effort = Effort::of(8, Precision::Exact);
-/// Arm and object together: with slopes joint by joint only the arm says what its gains are. An object that deviates for a
-/// reason that is not in the twin yet would bend them until the hit lands where it helps.
-const TOGETHER: Effort = Effort::of(8, Precision::Joints);
+/// So many linearisations, with slopes joint by joint: of the arm on the way; and of arm and object together, where only the arm says
+/// what its gains are. An object that deviates for a reason that is not in the twin yet would bend them until the hit lands where it helps.
+const JOINT_BY_JOINT: Effort = Effort::of(8, Precision::Joints);
+/// The last steps of the arm.
+const TO_THE_END: Effort = Effort::of(8, Precision::Exact);
 
 /// Steps in which [`identify`] shows how far it is.
 pub fn steps(admitted: &Admitted) -> u64 {
@@ -51,7 +50,7 @@ pub fn identify<E: Evidence>(
     bar.show(2, stages::BASELINE);
     let full = refined(bench, split, cell, admitted, &begun).unwrap_or(begun);
     bar.show(3, stages::BASELINE);
-    bench.fit((&[], full), &split.train, &even, None, TOGETHER)
+    bench.fit((&[], full), &split.train, &even, None, JOINT_BY_JOINT)
 }
 
 /// The arm by itself, from where its numbers begin.
@@ -62,9 +61,9 @@ fn of_the_arm<E: Likelihood>(
     bar: &Progress,
 ) -> Option<Hypothesis<E::Own>> {
     let even = floor::sensors_alone(bench.evidence);
-    let on_the_way = bench.fit((&[], start), &split.train, &even, None, WAY)?;
+    let on_the_way = bench.fit((&[], start), &split.train, &even, None, JOINT_BY_JOINT)?;
     bar.show(1, stages::BASELINE);
-    bench.fit((&[], on_the_way.full.clone()), &split.train, &even, Some(&on_the_way), LAST)
+    bench.fit((&[], on_the_way.full.clone()), &split.train, &even, Some(&on_the_way), TO_THE_END)
 }
 
 /// Where the fit begins.

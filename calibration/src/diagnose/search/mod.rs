@@ -3,14 +3,11 @@
 //! | module | |
 //! |---|---|
 //! | `baseline` | the paper's parameters identified |
-//! | `combine` | which effects act together |
-//! | `by_engine` | what was found, fitted to the roll-outs of another program |
-//! | `nearer` | what a step extends, fitted anew from where its best trial ended |
-//! | `refit`, `reidentify` | what was chosen fitted to the end, and its nearest rivals with it |
+//! | `effects` | which effects act together: the forward selection of them |
+//! | `refit` | what was chosen fitted to the end, and what it makes superfluous dropped |
+//! | `again` | fits made once more from where others ended |
 
+mod again;
 pub mod baseline;
-mod by_engine;
-pub mod combine;
-mod nearer;
+pub mod effects;
 pub mod refit;
-pub mod reidentify;

@@ -1,39 +1,38 @@
 //! The end of each step of the search: what was chosen is fitted to the end, and what it makes superfluous is dropped.
 
+
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::effort::{Effort, FIRST_PASS};
+use crate::diagnose::fit::effort::{Effort, REFINEMENT};
 use crate::diagnose::fit::sweep::Precision;
 use crate::diagnose::judge::score::predict;
-use crate::diagnose::judge::trial::{LEAST, NEARLY_ALL, convincing};
 use crate::diagnose::library::Alternative;
+use crate::diagnose::propose::Search;
 use crate::diagnose::propose::arm_alone::ArmAlone;
 use inference::admit::Split;
 use inference::likelihood::Evidence;
+use crate::diagnose::select::criteria::EFFECTS;
+use crate::diagnose::select::multi_start::{NEVER_ENOUGH, cheapest};
 
 /// The winner is fitted until it has converged, what is held of it with the others: its numbers are the answer. An arm alone
 /// converges well before so many linearisations.
 const LAST_PASS: Effort = Effort { frees_held: true, ..Effort::of(25, Precision::Exact) };
-/// With an object each linearisation takes far longer.
-const LAST_PASS_WITH_OBJECT: Effort = Effort::of(6, Precision::Joints);
 
-/// Where in its range a held form is tried, and how often the best of these is then looked for halfway to its neighbours.
-const SCANNED: [f64; 9] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0];
+/// Where in its range a held form is tried, and how often the best of these is then looked for halfway to its neighbours (choices).
+const SHARES_OF_RANGE: [f64; 9] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0];
 const HALVINGS: usize = 5;
 
 /// A fit to the end, from where it is and from elsewhere: an effect frees the object's parameters from what they stood in
 /// for, so they are found anew under it, and under the other way in which it could act where there are two.
-pub(in crate::diagnose) fn refitted<E: Evidence>(
-    bench: &Bench<'_, E>,
-    split: &Split,
+pub(super) fn refitted<E: Evidence>(
+    search: &Search<'_, E>,
     (fit, weights): (&Hypothesis, &[f64]),
-    refined: &impl Fn(&[f64]) -> Option<Vec<f64>>,
 ) -> Option<Hypothesis> {
-    let from = |full| bench.fit((&fit.effects, full), &split.train, weights, Some(fit), last_pass(bench));
-    let starts = [Some(fit.full.clone()), other_way(bench, fit)];
-    let anew = starts.iter().flatten().filter_map(|full| refined(full)).filter_map(from);
-    let best = anew.chain(from(fit.full.clone())).min_by(|a, b| a.deviance().total_cmp(&b.deviance()))?;
-    let scanned = scanned(bench, &best, weights).and_then(from).filter(|other| other.deviance() < best.deviance());
-    Some(scanned.unwrap_or(best))
+    let (bench, fits) = (search.bench, search.fits(&fit.effects, weights, fit));
+    let ways = [Some(fit.full.clone()), other_way(bench, fit)];
+    let anew = ways.iter().flatten().filter_map(|full| (search.refined)(full));
+    let best = fits.best(anew.chain([fit.full.clone()]), last_pass(bench))?;
+    let scanned = scanned(bench, &best, weights).and_then(|full| fits.fit(full, last_pass(bench)));
+    cheapest([Some(best), scanned].into_iter().flatten(), NEVER_ENOUGH)
 }
 
 /// The numbers of a fit whose last effect is one of the arm, with what is held of it where the arm's channels cost least, the
@@ -56,7 +55,7 @@ fn scanned<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis, weights: &[f64])
     };
     let clips = fit.clips();
     let cost = |full: &[f64]| arm.plain_cost(&clips, full, weights).unwrap_or(f64::INFINITY);
-    let mut tried: Vec<(f64, f64)> = SCANNED.iter().map(|share| (*share, cost(&at(*share)))).collect();
+    let mut tried: Vec<(f64, f64)> = SHARES_OF_RANGE.iter().map(|share| (*share, cost(&at(*share)))).collect();
     let least = |tried: &[(f64, f64)]| (0..tried.len()).min_by(|a, b| tried[*a].1.total_cmp(&tried[*b].1)).unwrap_or(0);
     for _ in 0..HALVINGS {
         let best = least(&tried);
@@ -85,36 +84,28 @@ fn other_way<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis) -> Option<Vec<
 /// The effort of a fit to the end. Clips with an object take a simulation for each number of their own; joints one by one
 /// besides would take too long.
 pub fn last_pass<E: Evidence>(bench: &Bench<'_, E>) -> Effort {
-    if bench.scatter.count() == 0 { LAST_PASS } else { LAST_PASS_WITH_OBJECT }
+    if bench.scatter.count() == 0 { LAST_PASS } else { REFINEMENT }
 }
 
-/// Drops effects that the others make superfluous, one after the other.
-pub(in crate::diagnose) fn without_superfluous<E: Evidence>(
-    bench: &Bench<'_, E>,
-    split: &Split,
-    mut now: Hypothesis,
-    weights: &[f64],
-) -> Hypothesis {
-    while now.effects.len() > 1 && !bench.interrupt.asked() {
-        let Some(whole) = predict(bench, &now, &split.choose, weights) else { break };
-        let dropped = now.effects.iter().find_map(|effect| {
-            let others: Vec<usize> = now.effects.iter().copied().filter(|other| other != effect).collect();
-            let mut full = now.full.clone();
-            let candidate = &bench.library.candidates[*effect];
-            candidate.numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
-            let fit = bench.fit((&others, full), &split.train, weights, Some(&now), FIRST_PASS)?;
-            let less = predict(bench, &fit, &split.choose, weights)?;
-            let cost = candidate.alternatives[0].probes.len();
-            let loss = whole.over(&less);
-            let missed = loss.share > NEARLY_ALL && loss.nats > LEAST;
-            (!missed && !convincing(&loss, cost)).then_some(fit)
-        });
-        match dropped {
-            Some(fit) => now = fit,
-            None => break,
-        }
+/// A hypothesis without the first of its effects that the others make superfluous.
+pub(super) fn fewer<E: Evidence>(search: &Search<'_, E>, now: &Hypothesis, weights: &[f64]) -> Option<Hypothesis> {
+    let bench = search.bench;
+    if now.effects.len() < 2 || bench.interrupt.asked() {
+        return None;
     }
-    now
+    let predicted = |fit: &Hypothesis| predict(bench, fit, &search.split.choose, weights);
+    let whole = predicted(now)?;
+    let without = |place: usize| {
+        let effect = now.effects[place];
+        let others = [&now.effects[..place], &now.effects[place + 1..]].concat();
+        let full = bench.library.with_effects_of(now.full.clone(), &[effect], &bench.library.start());
+        let fit = search.fits(&others, weights, now).fit(full, REFINEMENT)?;
+        let loss = whole.over(&predicted(&fit)?);
+        let missed = loss.in_nearly_all() && loss.nats > EFFECTS.min_gain_nats;
+        let cost = bench.library.candidates[effect].alternatives[0].probes.len();
+        (!missed && !EFFECTS.proves(&loss, cost)).then_some(fit)
+    };
+    (0..now.effects.len()).find_map(without)
 }
 
 #[cfg(test)]

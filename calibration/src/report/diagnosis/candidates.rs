@@ -1,9 +1,8 @@
 //! The candidates: those in question as a table, those ruled out folded away, those that could not have been seen by name.
 
-use crate::answer::Size;
+use crate::answer::{Size, numbers};
 use crate::answer::diagnosis::{Candidate, Status};
-use crate::answer::numbers;
-use crate::diagnose::judge::confidence::MOST;
+use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 use crate::page::canvas::Canvas;
 use crate::page::figure::forest::{Group, forest};
 use crate::words::parameters::Numbers;
@@ -29,7 +28,7 @@ pub(super) fn sections(candidates: &[Candidate]) -> Markup {
             h2 { "Candidates" }
             p.note {
                 (candidates.len()) " effects were tested; intervals are to hold the truth in 90 % of cases. The shrink of an effect \
-                is what it adds, alone or beside those named before it. No probability is given beyond " (probability(MOST))
+                is what it adds, alone or beside those named before it. No probability is given beyond " (probability(MAX_PROBABILITY))
                 ": a cause outside of the library is never excluded."
             }
             @if open.is_empty() { p { "None of them is named or still possible." } } @else { (table(&open)) }
@@ -107,7 +106,7 @@ fn bar(value: f64) -> Markup {
     let mut canvas = Canvas::new();
     canvas.rect("track", [0.0, 2.0], [BAR, 9.0]);
     canvas.rect("after", [0.0, 2.0], [BAR * value.clamp(0.0, 1.0), 9.0]);
-    let words = limited(value, MOST);
+    let words = limited(value, MAX_PROBABILITY);
     html! { div { (words) } (canvas.finish([BAR, 13.0], &words)) }
 }
 

@@ -1,0 +1,235 @@
+//! Which effects act together: effects are added while clips are predicted better with them, and dropped or swapped when they are
+//! not needed any more.
+//!
+//! Strokes that another program simulates are looked at around what each step extends ([`Anchored`]); what is extended, and what is found,
+//! is fitted to that program itself.
+
+use super::again::{by_engine, found_by_engine, reconsidered, rivals_refitted, without_the_best};
+use super::refit::{fewer, last_pass, refitted};
+use inference::admit::Split;
+use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
+use inference::likelihood::{Evidence, Group, Row};
+use crate::diagnose::fit::anchored::Anchored;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT, SCREENING};
+use crate::diagnose::fit::{floor, stages, undetermined};
+use crate::diagnose::judge::gap::Residuals;
+use crate::diagnose::judge::remainder::Left;
+use crate::diagnose::judge::score::predict;
+use crate::diagnose::judge::trial::{Found, Step, Trial};
+use crate::diagnose::propose::screening::{arm_gap_is_open, overlooked, seen_at_the_least_scatter, to_fit};
+use crate::diagnose::propose::starts::{self, MAX_PLACES};
+use crate::diagnose::propose::{Around, Search, arm_alone, signatures};
+use crate::diagnose::select::criteria::EFFECTS;
+use crate::diagnose::select::forward::{Selection, backward, forward};
+use crate::diagnose::select::multi_start::{NEVER_ENOUGH, cheapest};
+use shared_mem::progress::Progress;
+
+/// So often at most the steps of a search are begun anew from a better fit of what they extend (a choice).
+const MAX_RESTARTS: usize = 2;
+/// A fit is near the best within [`NEAR_DEVIANCE`] of its deviance, or within this share of what the best gains (a choice).
+const NEAR_SHARE: f64 = 0.4;
+/// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
+const NUMERICS_OF_GAP: f64 = 1e-4;
+
+/// Searches from a baseline; `refined` gives numbers whose object is found anew under the effects in them, where there is one.
+pub fn search<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    baseline: Hypothesis,
+    refined: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
+    bar: &Progress,
+) -> Option<Found> {
+    let search = &Search { bench, split, refined, bar };
+    let selected = forward(search, baseline)?;
+    let around = Anchored::new(bench.evidence, &selected.last.full);
+    let anchored = around.bench(bench);
+    let steps: Vec<Step> = selected.steps.into_iter().map(|tried| tried.step).collect();
+    let (near, weights) = (&search.on(&anchored), &steps.last()?.weights);
+    let last = undetermined::without(near.bench, &backward(selected.last, |now| fewer(near, now, weights)));
+    Some(found_by_engine(search, Found { steps, last }))
+}
+
+/// A step, and how often it was begun anew.
+pub(in crate::diagnose) struct Tried {
+    step: Step,
+    restarts: usize,
+}
+
+impl<E: Evidence> Selection for Search<'_, E> {
+    type Model = Hypothesis;
+    type Step = Tried;
+
+    fn step(&self, now: &Hypothesis, before: &[Tried]) -> Option<(Tried, Option<Hypothesis>)> {
+        let first = before.first().map(|tried| &tried.step);
+        let before_that: usize = before.iter().map(|tried| tried.restarts).sum();
+        let mut from = now.clone();
+        for restarts in 0.. {
+            let ended = |step| (Tried { step, restarts }, None);
+            let around = Anchored::new(self.bench.evidence, &from.full);
+            let bench = around.bench(self.bench);
+            let near = &self.on(&bench);
+            if first.is_some_and(|first| is_spent(near, first, &from)) {
+                return untried(near, &from, first).map(ended);
+            }
+            let Some(step) = tried(near, &from, first) else {
+                // Cut short by its budget: what was found before stands.
+                let stands = if self.bench.interrupt.spent() { untried(near, &from, first) } else { None };
+                return stands.map(ended);
+            };
+            let step = reconsidered(near, step);
+            let better = if before_that + restarts < MAX_RESTARTS { without_the_best(near, &step) } else { None };
+            let Some(better) = better else {
+                let (step, extended) = extended(near, step, !before.is_empty())?;
+                let extended = extended.map(|fit| by_engine(self, fit, &step.weights));
+                return Some((Tried { step, restarts }, extended));
+            };
+            self.bar.insert(&stages::FURTHER);
+            from = by_engine(self, better, &step.weights);
+        }
+        None
+    }
+
+    fn extends(tried: &Tried) -> &Hypothesis {
+        &tried.step.from
+    }
+}
+
+/// What a step extends with the best of its trials, both fitted to the end beside its nearest rivals; `None` as the second where none is
+/// worth it. `further`: effects were found before.
+fn extended<E: Evidence>(search: &Search<'_, E>, step: Step, further: bool) -> Option<(Step, Option<Hypothesis>)> {
+    let best = |step: &Step| step.best(search.bench).map(|(_, fit, _)| fit.clone());
+    let Some(fit) = best(&step).filter(|_| step.from.effects.len() < EFFECTS.max_extensions) else {
+        return Some((step, None));
+    };
+    // The best so far, as far as it was fitted.
+    if search.bench.interrupt.asked() {
+        return Some((step, Some(fit)));
+    }
+    search.bar.stage(stages::REFINEMENT, 2);
+    if further {
+        search.bar.insert(&stages::FURTHER);
+    }
+    let to_the_end = refitted(search, (&fit, &step.weights))?;
+    search.bar.show(1, stages::REFINEMENT);
+    let step = rivals_refitted(search, step, &to_the_end);
+    let extended = match best(&step) {
+        Some(other) if other.effects != to_the_end.effects => Some(refitted(search, (&other, &step.weights))?),
+        Some(_) => Some(to_the_end),
+        // Fitted to the end it predicts clips no better than chance: what it did before was the fit's.
+        None => None,
+    };
+    Some((step, extended))
+}
+
+/// Whether the effects found so far leave no more than numerics do: a further one would only name how engines differ. The
+/// first effect is never held back by this.
+fn is_spent<E: Evidence>(search: &Search<'_, E>, first: &Step, now: &Hypothesis) -> bool {
+    let typical =
+        |hypothesis| Residuals::at(search.bench, hypothesis, search.split.elsewhere()).map(|left| left.typical());
+    let (Some(before), Some(after)) = (typical(&first.from), typical(now)) else { return false };
+    Left::of_groups(&before, &after).iter().all(|left| {
+        left.after - left.floor <= JOINTS_EXCESS_BESIDE_A_CAUSE.value.max(NUMERICS_OF_GAP * (left.before - left.floor))
+    })
+}
+
+/// Sweeps around a hypothesis, scores all candidates, fits the best. `first`: the first step, where this is not the first.
+fn tried<E: Evidence>(search: &Search<'_, E>, from: &Hypothesis, first: Option<&Step>) -> Option<Step> {
+    let bench = search.bench;
+    let (weights, mut scored, narrow) = signatures::around(bench, search.split, from, search.bar)?;
+    let step = begun(search, (from, weights), first)?;
+    let mut promising = to_fit(bench, &step.from, &scored, (&step.whole, &step.left));
+    let closed = !arm_gap_is_open(&step.whole, &step.left);
+    for seen in closed.then(|| seen_at_the_least_scatter(bench, &step.from, &narrow)).into_iter().flatten() {
+        if !promising.contains(&seen.candidate) {
+            promising.push(seen.candidate);
+            scored.iter_mut().filter(|s| s.candidate == seen.candidate).for_each(|s| *s = seen.clone());
+        }
+    }
+    let own_numbers = bench.scatter.count() > 0;
+    let trials = scored.into_iter().map(|scored| Trial { scored, fitted: None, closes: 0.0, own_numbers }).collect();
+    let step = fitted(search, Step { trials, ..step }, &promising, false);
+    if step.best(bench).is_some() {
+        return Some(step);
+    }
+    let rest = overlooked(bench, &step);
+    search.bar.insert(&stages::MORE_FITS);
+    Some(fitted(search, step, &rest, true))
+}
+
+/// A step in which nothing is tried: the hypothesis with the weights that it leaves itself.
+fn untried<E: Evidence>(search: &Search<'_, E>, now: &Hypothesis, first: Option<&Step>) -> Option<Step> {
+    let left = Residuals::at(search.bench, now, &search.split.train)?;
+    begun(search, (now, floor::weights(search.bench.evidence, &left.clips)), first)
+}
+
+/// A step before anything is tried. Under these weights the hypothesis may be printed, so what acts is fitted to the end again.
+fn begun<E: Evidence>(
+    search: &Search<'_, E>,
+    (from, weights): (&Hypothesis, Vec<f64>),
+    first: Option<&Step>,
+) -> Option<Step> {
+    let (bench, split) = (search.bench, search.split);
+    let effort = if from.effects.is_empty() { REFINEMENT } else { last_pass(bench) };
+    let from = search.fits(&from.effects, &weights, from).fit(from.full.clone(), effort)?;
+    let predicted = predict(bench, &from, &split.choose, &weights)?;
+    let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
+    let whole = first.map_or_else(|| left.clone(), |first| first.whole.clone());
+    let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].group == Group::Arm;
+    let arm_rows = split.open().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum();
+    Some(Step { from, predicted, trials: Vec::new(), weights, arm_rows, left, whole })
+}
+
+/// The step with candidates fitted and judged: all a little, those that come near the best to the end. `overlooked` says that the
+/// score test did not point to them.
+fn fitted<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: &[usize], overlooked: bool) -> Step {
+    let (bench, split) = (search.bench, search.split);
+    let asked = (0..step.trials.len()).filter(|k| wanted.contains(&step.trials[*k].scored.candidate));
+    let on_arm = |place: &usize| {
+        let trial = &step.trials[*place];
+        trial.own_numbers && bench.library.candidates[trial.scored.candidate].is_of_arm()
+    };
+    let (of_arm, others): (Vec<usize>, Vec<usize>) = asked.partition(on_arm);
+    let mut fits = arm_alone::fitted(search, &step, (&of_arm, overlooked), others.len());
+    let before = fits.len();
+    for (done, place) in others.into_iter().enumerate() {
+        if bench.interrupt.asked() {
+            return step;
+        }
+        let candidate = step.trials[place].scored.candidate;
+        let label = stages::of(stages::FITS, bench.library.candidates[candidate].effect.name);
+        search.bar.show((before + done) as u64, &label);
+        fits.extend(a_little(search, &step, place, overlooked).map(|fit| (place, fit)));
+    }
+    let best = fits.iter().map(|(_, fit)| fit.deviance()).fold(step.from.deviance(), f64::min);
+    let near = best + NEAR_DEVIANCE.max(NEAR_SHARE * (step.from.deviance() - best));
+    search.bar.stage(stages::LAST_FITS, fits.len() as u64);
+    let to_the_end = |(done, (place, fit)): (usize, (usize, Hypothesis))| {
+        search.bar.show(done as u64, stages::LAST_FITS);
+        let effort = bench.trying(step.trials[place].scored.candidate, REFINEMENT);
+        let more = || search.fits(&fit.effects, &step.weights, &fit).fit(fit.full.clone(), effort);
+        let nearer = if fit.deviance() < near { more() } else { None };
+        (place, nearer.unwrap_or(fit))
+    };
+    let fits: Vec<(usize, Hypothesis)> = fits.into_iter().enumerate().map(to_the_end).collect();
+    step.with_fits(bench, split, fits)
+}
+
+/// A few steps of a candidate's fit, from wherever it may begin.
+fn a_little<E: Evidence>(search: &Search<'_, E>, step: &Step, place: usize, overlooked: bool) -> Option<Hypothesis> {
+    let (bench, scored) = (search.bench, &step.trials[place].scored);
+    let effects = [&step.from.effects[..], &[scored.candidate]].concat();
+    let fits = search.fits(&effects, &step.weights, &step.from);
+    let starts = starts::kept(&Around { bench, from: &step.from, weights: &step.weights }, scored, overlooked);
+    let effort = bench.trying(scored.candidate, SCREENING);
+    if !starts::has_places(&bench.library.candidates[scored.candidate]) {
+        return fits.best(starts, effort);
+    }
+    // What lies in the right place may come down later than what stands in for it elsewhere.
+    let mut places: Vec<Hypothesis> = starts.into_iter().filter_map(|start| fits.fit(start, effort)).collect();
+    places.sort_by(|a, b| a.deviance().total_cmp(&b.deviance()));
+    let effort = bench.trying(scored.candidate, REFINEMENT);
+    let further = |fit: &Hypothesis, effort| search.fits(&effects, &step.weights, fit).fit(fit.full.clone(), effort);
+    let to_the_end = places.iter().take(MAX_PLACES).filter_map(|fit| further(fit, effort));
+    cheapest(to_the_end, NEVER_ENOUGH)
+}

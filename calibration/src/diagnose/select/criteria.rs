@@ -1,0 +1,86 @@
+//! When an extension of a model is taken on, and which are fitted at all. Nats are differences of log-likelihood of clips that were not
+//! fitted.
+//!
+//! These thresholds are choices; `calibration benchmark` counts how often verdicts that come of them are right.
+
+use super::gain::Gain;
+
+/// Thresholds of one forward selection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Criteria {
+    /// At most so many extensions are taken on.
+    pub max_extensions: usize,
+    /// So many of those that promise most are fitted at each step.
+    pub max_fitted: usize,
+    /// An extension is fitted whose gain by slopes noise reaches with no higher probability ...
+    pub max_chance: f64,
+    /// ... and comes to this share of what the best promises.
+    pub min_promise: f64,
+    /// What is taken on is worth more than this [nats], and more than one for each of its numbers (AIC).
+    pub min_gain_nats: f64,
+    /// A clip counts up to so many nats whatever the others gain ([`Gain::of`]).
+    pub max_of_clip_nats: f64,
+    /// From so many clips on it is enough that nearly all gain: seven of eight do so once in thirty by chance.
+    pub min_agreeing_clips: Option<usize>,
+    /// More than this share of the clips gains.
+    pub min_share: f64,
+    /// Whether the scatter between few clips counts as known from few (Student's t).
+    pub by_student: bool,
+}
+
+/// Of effects in one session.
+pub const EFFECTS: Criteria = Criteria {
+    max_extensions: 4,
+    max_fitted: 5,
+    max_chance: 0.2,
+    min_promise: 0.1,
+    min_gain_nats: 4.0,
+    max_of_clip_nats: 4.0,
+    min_agreeing_clips: None,
+    min_share: 0.5,
+    by_student: false,
+};
+
+/// Of changes from one session to another.
+pub const CHANGES: Criteria = Criteria {
+    max_extensions: 3,
+    max_fitted: 6,
+    max_chance: 0.05,
+    min_promise: 0.05,
+    min_gain_nats: 5.0,
+    max_of_clip_nats: 5.0,
+    min_agreeing_clips: Some(8),
+    min_share: 0.0,
+    by_student: true,
+};
+
+impl Criteria {
+    /// Whether an extension is fitted whose gain by its slopes noise reaches with this chance, beside the best.
+    pub fn promises(&self, (chance, gain): (f64, f64), best: f64) -> bool {
+        chance < self.max_chance && gain > self.min_promise * best
+    }
+
+    /// Of candidates, the most promising first, those that are fitted; `said`: how likely noise makes so much of one by its slopes, and how
+    /// much that is.
+    pub fn promising<'a, T>(
+        &'a self,
+        candidates: &'a [T],
+        said: impl Fn(&T) -> (f64, f64) + Copy + 'a,
+    ) -> impl Iterator<Item = &'a T> {
+        let best = candidates.iter().map(|candidate| said(candidate).1).fold(0.0, f64::max);
+        let promising = move |candidate: &&T| self.promises(said(candidate), best);
+        candidates.iter().filter(promising).take(self.max_fitted)
+    }
+
+    /// What an extension with so many numbers has to be worth [nats].
+    pub fn price(&self, cost: usize) -> f64 {
+        self.min_gain_nats.max(cost as f64)
+    }
+
+    /// Whether it is no chance that an extension with so many numbers gains this.
+    pub fn proves(&self, gain: &Gain, cost: usize) -> bool {
+        let agree = self.min_agreeing_clips.is_some_and(|least| gain.clips() >= least && gain.in_nearly_all());
+        let by_chance = if self.by_student { gain.by_chance() } else { gain.twice_its_error() };
+        gain.nats > self.price(cost) && gain.share > self.min_share && (agree || gain.nats > by_chance)
+    }
+}
