@@ -9,11 +9,11 @@ use crate::benchmark::calibrate::Regenerated;
 use crate::benchmark::score::{Method, Scores};
 use crate::diagnose::against::change;
 use crate::diagnose::against::{Candidate as Compared, Comparison};
-use crate::words::{channel_in_words, words};
+use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 use crate::words::parameters::{of_joints, part};
 use crate::words::quantity::{Unit, short, span};
 use crate::words::share::{limited, percent, percent_interval};
-use crate::diagnose::judge::confidence::MAX_PROBABILITY;
+use crate::words::{channel_in_words, words};
 
 /// Places of the gap that are named.
 const SHOWN_PLACES: usize = 3;

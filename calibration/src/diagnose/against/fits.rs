@@ -7,11 +7,11 @@ use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out;
 use crate::diagnose::judge::score::{Predicted, predict};
-use inference::admit::Split;
-use inference::likelihood::Evidence;
 use crate::diagnose::select::criteria::CHANGES;
 use crate::diagnose::select::gain::Gain;
 use crate::diagnose::select::multi_start::Fit;
+use inference::admit::Split;
+use inference::likelihood::Evidence;
 
 /// What all fits share.
 pub(super) struct PairBench<'a, E> {

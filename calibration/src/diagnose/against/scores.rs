@@ -12,9 +12,9 @@ use super::turned::{Acts, Model, SIDES, Side, side_of};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::{Scored, chance};
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
+use crate::diagnose::propose::signatures::weights;
 use inference::estimate::quadratic::{bounded_minimum, eliminate, minimum};
 use inference::likelihood::Evidence;
-use crate::diagnose::propose::signatures::weights;
 use inference::statistics::student_sigmas;
 use nalgebra::{DMatrix, DVector};
 

@@ -8,12 +8,11 @@ use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{REFINEMENT, SCREENING};
 use crate::diagnose::fit::stages;
 use crate::diagnose::search::refit::last_pass;
-use crate::words::words;
-use inference::likelihood::Evidence;
 use crate::diagnose::select::criteria::CHANGES;
 use crate::diagnose::select::forward::{Selection, backward, forward};
 use crate::diagnose::select::gain::Gain;
 use crate::diagnose::select::multi_start::{Fit, cheapest};
+use inference::likelihood::Evidence;
 use shared_mem::progress::{Planned, Progress};
 
 /// At most so many effects that both sessions have are found on the way.

@@ -3,8 +3,8 @@
 use super::verdict::{Decision, Finding};
 use crate::answer::diagnosis::{Kind, Share};
 use crate::diagnose::judge::gap::Shrunk;
-use crate::words::{percent, words};
 use crate::diagnose::judge::trial::MIN_SHARE_CLOSED;
+use crate::words::{percent, words};
 
 /// What the sentence is made of, beside the finding itself.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -5,10 +5,10 @@ use crate::answer::diagnosis::{Kind, Status};
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::shortlist::{BY_CHANCE, TESTABLE};
 use crate::diagnose::judge::trial::{Found, LARGE_SHARE_CLOSED, MIN_NATS_PER_ROW, Trial};
-use crate::words::words;
-use inference::likelihood::Evidence;
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::gain::Gain;
+use crate::words::words;
+use inference::likelihood::Evidence;
 
 /// A candidate with all that its reason is drawn from.
 #[derive(Debug, Clone, Copy)]

@@ -15,8 +15,8 @@ use inference::statistics::normal;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};
 
-/// Level of the intervals [1]: that of 1.645 standard deviations of a normal distribution.
-const LEVEL: f64 = 0.900_030_188_921_757_2;
+/// Level of the intervals [1].
+const LEVEL: f64 = 0.90;
 
 /// The parameters of one of a hypothesis' effects.
 pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {

@@ -11,8 +11,8 @@ use super::score::predict_unseen;
 use super::trial::MIN_SHARE_CLOSED;
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::fit::bench::Bench;
-use inference::likelihood::{Evidence, Group};
 use crate::diagnose::select::gain::Gain;
+use inference::likelihood::{Evidence, Group};
 
 /// What they say.
 pub(in crate::diagnose) struct Confirmation {

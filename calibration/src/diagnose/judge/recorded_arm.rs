@@ -3,9 +3,9 @@
 
 use crate::answer::diagnosis::StageTest;
 use crate::diagnose::DiagnoseError;
+use crate::diagnose::criteria::MOST_OF_IT;
 use crate::words::in_unit;
 use inference::admit::{Admitted, torques};
-use crate::diagnose::criteria::MOST_OF_IT;
 use shared_mem::cell::Cell;
 use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;

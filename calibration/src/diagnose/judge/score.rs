@@ -7,11 +7,11 @@
 use super::held_out::Fits;
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
 use crate::diagnose::fit::left_out::shift_to;
+use crate::diagnose::select::criteria::EFFECTS;
+use crate::diagnose::select::gain::Gain;
 use inference::estimate::quadratic::value;
 use inference::likelihood::Evidence;
 use inference::likelihood::random_effects_scale::{Around, at_the_best_scale};
-use crate::diagnose::select::criteria::EFFECTS;
-use crate::diagnose::select::gain::Gain;
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,8 +3,8 @@
 
 use super::trial::{Found, LARGE_SHARE_CLOSED, Trial};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use inference::likelihood::Evidence;
 use crate::diagnose::select::criteria::EFFECTS;
+use inference::likelihood::Evidence;
 
 /// An effect that is likely, and not proven.
 pub(in crate::diagnose) struct Unproven<'a> {

@@ -8,8 +8,6 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, PROBE, REFINEMENT, SCREENING};
 use crate::diagnose::fit::{stages, undetermined};
 use crate::diagnose::judge::trial::Step;
-use crate::words::words;
-use inference::admit::Split;
 use crate::diagnose::select::multi_start::MultiStart;
 use inference::estimate::{ClipModel, Impossible};
 use inference::likelihood::arm::following::Moment;
@@ -151,7 +149,6 @@ impl<E: Evidence> Likelihood for ArmAlone<'_, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use inference::admit::Split;
     use crate::diagnose::fit::effort::Effort;
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::judge::gap::Typical;
@@ -159,9 +156,10 @@ mod tests {
     use crate::diagnose::judge::trial::Trial;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
+    use inference::admit::Split;
     use inference::likelihood::Group;
-    use worlds::world::{Fault, Kind, World};
     use shared_mem::progress::Progress;
+    use worlds::world::{Fault, Kind, World};
 
     /// The baseline as it is hidden in a world.
     fn hidden_baseline(library: &Library, world: &World) -> Vec<f64> {

@@ -14,12 +14,12 @@ pub mod screening;
 pub mod signatures;
 pub mod starts;
 
-use inference::admit::Split;
-use inference::likelihood::{Evidence, Likelihood};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
 use crate::diagnose::select::multi_start::MultiStart;
+use inference::admit::Split;
+use inference::likelihood::{Evidence, Likelihood};
 use shared_mem::progress::Progress;
 
 /// What every step of a search for effects is given.

@@ -4,8 +4,8 @@
 //! slope leads from one to the other. So all orders are tried in steps that a fit can bridge, every joint by itself (a
 //! periodogram over the position instead of over time, by least squares: Lomb 1976).
 
-use inference::likelihood::{Likelihood, Reach};
 use super::Around;
+use inference::likelihood::{Likelihood, Reach};
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;

@@ -6,8 +6,8 @@ use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
 use crate::diagnose::judge::gap::Typical;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::trial::Step;
-use inference::likelihood::Evidence;
 use crate::diagnose::select::criteria::EFFECTS;
+use inference::likelihood::Evidence;
 use twin::effects::Stage;
 
 /// An arm whose gap is smaller than this in squared sigmas is not the cause of what an object does.

@@ -2,13 +2,13 @@
 //! rough hits there are many. Each of them is one more start of the same fit; only where it begins differs.
 
 use crate::diagnose::criteria::ALIKE_SHARE;
-use inference::likelihood::Evidence;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT};
 use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::trial::{Found, LARGE_SHARE_CLOSED, MIN_SHARE_CLOSED, Step, Trial};
 use crate::diagnose::propose::Search;
 use crate::diagnose::select::criteria::EFFECTS;
+use inference::likelihood::Evidence;
 
 /// So many trials of a step are (a choice).
 const MAX_REFITTED: usize = 2;

@@ -6,9 +6,7 @@
 
 use super::again::{by_engine, found_by_engine, reconsidered, rivals_refitted, without_the_best};
 use super::refit::{fewer, last_pass, refitted};
-use inference::admit::Split;
 use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
-use inference::likelihood::{Evidence, Group, Row};
 use crate::diagnose::fit::anchored::Anchored;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT, SCREENING};
@@ -23,6 +21,8 @@ use crate::diagnose::propose::{Around, Search, arm_alone, signatures};
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::forward::{Selection, backward, forward};
 use crate::diagnose::select::multi_start::{NEVER_ENOUGH, cheapest};
+use inference::admit::Split;
+use inference::likelihood::{Evidence, Group, Row};
 use shared_mem::progress::Progress;
 
 /// So often at most the steps of a search are begun anew from a better fit of what they extend (a choice).

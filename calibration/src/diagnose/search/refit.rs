@@ -1,6 +1,5 @@
 //! The end of each step of the search: what was chosen is fitted to the end, and what it makes superfluous is dropped.
 
-
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{Effort, REFINEMENT};
 use crate::diagnose::fit::sweep::Precision;
@@ -8,10 +7,9 @@ use crate::diagnose::judge::score::predict;
 use crate::diagnose::library::Alternative;
 use crate::diagnose::propose::Search;
 use crate::diagnose::propose::arm_alone::ArmAlone;
-use inference::admit::Split;
-use inference::likelihood::Evidence;
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::multi_start::{NEVER_ENOUGH, cheapest};
+use inference::likelihood::Evidence;
 
 /// The winner is fitted until it has converged, what is held of it with the others: its numbers are the answer. An arm alone
 /// converges well before so many linearisations.

@@ -1,9 +1,9 @@
 //! One fit from several starts: a local solver finds the nearest minimum, and over hits, sticking joints and limits there are many. What
 //! differs from effect to effect is where its fits begin, and that is data.
 
-use inference::likelihood::Likelihood;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
+use inference::likelihood::Likelihood;
 
 /// A fit with its cost.
 pub trait Fit {

@@ -1,7 +1,7 @@
 //! The candidates: those in question as a table, those ruled out folded away, those that could not have been seen by name.
 
-use crate::answer::{Size, numbers};
 use crate::answer::diagnosis::{Candidate, Status};
+use crate::answer::{Size, numbers};
 use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 use crate::page::canvas::Canvas;
 use crate::page::figure::forest::{Group, forest};
