@@ -292,7 +292,10 @@ mod tests {
         let sessions = [session(1, 2.0), session(2, 0.5), session(3, -2.0), session(4, -0.5)];
         let covered = &covered(&sessions, 0.95)["a"];
         assert_eq!((covered.inside.hits, covered.inside.of, covered.beside), (2, 4, [1, 1]));
-        assert!((covered.spread - 1.96 * (8.5f64 / 4.0).sqrt()).abs() < 1e-12 && covered.half_width == 1.0);
+        assert!(
+            (covered.spread - statistics::normal(0.95) * (8.5f64 / 4.0).sqrt()).abs() < 1e-12
+                && covered.half_width == 1.0
+        );
         assert!(table(&sessions, 0.95).contains("50.0 %"));
     }
 }

@@ -75,7 +75,8 @@ impl Fit {
 /// A slope that twelve clips share, each with an offset of its own that is of no interest:
 ///
 /// ```
-/// use inference::estimate::{ClipModel, Impossible, Intervals, Options, Random, Unknown, at_bounds, fit};
+/// use inference::estimate::interval::LEVEL;
+/// use inference::estimate::{ClipModel, Impossible, Intervals, Random, Schedule, Unknown, at_bounds, fit};
 ///
 /// struct Lines;
 /// const SIGMA: f64 = 0.01;
@@ -100,8 +101,8 @@ impl Fit {
 ///
 /// let unknowns = [Unknown { name: "slope".into(), start: 1.0, lower: 0.0, upper: 10.0, step: 1e-4 }];
 /// let random = [Random { name: "offset".into(), sigma: 0.2, step: 1e-4 }];
-/// let found = fit(&Lines, &unknowns, &random, &Options::default(), |_, _| true)?;
-/// let intervals = Intervals::new(&found, &at_bounds(&unknowns, &found.shared));
+/// let found = fit(&Lines, &unknowns, &random, &Schedule::default(), |_, _| true)?;
+/// let intervals = Intervals::new(&found, &at_bounds(&unknowns, &found.shared), LEVEL);
 /// assert!(found.converged);
 /// assert!((found.shared[0] - 2.0).abs() < intervals.half_width[0], "{:?}", found.shared);
 /// # Ok::<(), inference::estimate::Impossible>(())
