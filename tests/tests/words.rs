@@ -35,15 +35,9 @@ const IN_CODE: [(&str, &str); 20] = [
 
 /// Folders and files of `calibration` that still hold some of them. The list only ever gets shorter.
 const NOT_YET: &[&str] = &[
-    "calibration/inference/src/admit/",
-    "calibration/inference/src/estimate/",
-    "calibration/inference/src/forward/",
-    "calibration/inference/src/likelihood/",
-    "calibration/src/benchmark/",
-    "calibration/src/diagnose/",
-    "calibration/src/identify/",
+    "calibration/src/diagnose/conclude/headline.rs",
+    "calibration/src/identify/arm/verdict.rs",
     "calibration/vision/src/",
-    "calibration/worlds/src/",
 ];
 
 /// Whether a line holds a phrase, whole words of it.

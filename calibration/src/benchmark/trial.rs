@@ -42,12 +42,12 @@ pub fn examine(world: &World, clips: Vec<Clip>, interrupt: &Interrupt) -> Result
     let theta = |numbers: &[f64]| library.theta(numbers);
     let arm = ArmClips::moments(&world.cell, &admitted.clips, theta).map_err(Refused::from)?;
     let split = admitted.split(options.seed);
-    let court = Court { world, library: &library, split, admitted: &admitted, interrupt };
+    let context = TrialContext { world, library: &library, split, admitted: &admitted, interrupt };
     if admitted.with_object {
         let object = ObjectClips::new(&world.cell, admitted.clips.clone(), library.settings.clone())?;
-        court.cases(&CellClips::new(Some(arm), object, |numbers: &[f64]| library.felt_by_arm(numbers)), &found)
+        context.cases(&CellClips::new(Some(arm), object, |numbers: &[f64]| library.felt_by_arm(numbers)), &found)
     } else {
-        court.cases(&arm, &found)
+        context.cases(&arm, &found)
     }
 }
 
@@ -66,7 +66,7 @@ pub fn sealed(world: &World, clips: Vec<Clip>) -> (Session, Admitted) {
     (session, Admitted::of(clips, files, with_object).in_parts())
 }
 
-struct Court<'a> {
+struct TrialContext<'a> {
     world: &'a World,
     library: &'a Library,
     split: Split,
@@ -74,7 +74,7 @@ struct Court<'a> {
     interrupt: &'a Interrupt,
 }
 
-impl Court<'_> {
+impl TrialContext<'_> {
     fn cases<E: Evidence>(&self, evidence: &E, found: &Diagnosis) -> Result<Vec<Case>, DiagnoseError> {
         let bench = Bench {
             evidence,

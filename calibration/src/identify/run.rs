@@ -174,7 +174,7 @@ impl Run<'_> {
         Ok(Outcome { fit, simulated: watch.simulated(), convergence, arrived: found.arrived })
     }
 
-    /// Mean squared residual of all clips; the clips' own numbers at zero.
+    /// Mean squared residual of all clips; the clips' nuisance parameters at zero.
     fn cost(&self, model: &impl ClipModel, shared: &[f64]) -> f64 {
         let own = vec![0.0; self.random.len()];
         let (mut sum, mut rows, mut out) = (0.0, 0, Vec::new());

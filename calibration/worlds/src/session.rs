@@ -67,16 +67,16 @@ pub fn record(world: &World, count: usize) -> Result<Vec<Clip>, SessionError> {
 /// # Errors
 /// As [`record`].
 pub fn record_paced(world: &World, paces: &[f64]) -> Result<Vec<Clip>, SessionError> {
-    let studio = Studio { world, body: Body::of(&world.cell)? };
-    paces.iter().enumerate().map(|(i, pace)| studio.clip(i, paces.len(), *pace)).collect()
+    let context = RecordingContext { world, body: Body::of(&world.cell)? };
+    paces.iter().enumerate().map(|(i, pace)| context.clip(i, paces.len(), *pace)).collect()
 }
 
-struct Studio<'a> {
+struct RecordingContext<'a> {
     world: &'a World,
     body: Body,
 }
 
-impl Studio<'_> {
+impl RecordingContext<'_> {
     fn clip(&self, index: usize, count: usize, pace: f64) -> Result<Clip, SessionError> {
         let mut rng = Pcg64::seed_from_u64(self.world.number.wrapping_mul(1000) + index as u64);
         let object = self.place(&mut rng);

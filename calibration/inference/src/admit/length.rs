@@ -7,7 +7,7 @@ use shared_mem::recording::{Clip, JointSeries};
 
 /// So much motion counts in all [s]. Residuals of a model that is not exact are alike over tenths of a second, so this holds some
 /// hundred that say something of their own in every channel, more than the numbers of any hypothesis; it is three times what the
-/// simulated sessions have in which effects are told apart (34 s).
+/// simulated sessions have in which effects are separated (34 s).
 const ENOUGH_MOTION: f64 = 96.0;
 /// Commands from before the part that counts are kept for so long: some are still on their way [ns].
 const COMMANDS_BEFORE_NS: u64 = 500_000_000;

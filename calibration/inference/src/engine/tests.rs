@@ -104,7 +104,7 @@ fn silence_ends_at_the_limit_and_takes_what_the_engine_started_along() {
     end(&[sleeper.trim().to_owned()]);
 }
 
-/// Whether a process has ended; its parent may not have been told yet.
+/// Whether a process has ended; its parent may not know yet.
 fn is_gone(pid: &str) -> bool {
     let state = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
     state.is_empty() || state.contains(") Z ")

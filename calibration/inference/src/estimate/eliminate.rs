@@ -1,6 +1,7 @@
-//! A clip's likelihood with its own numbers integrated out: what is left for the shared ones.
+//! A clip's likelihood with its nuisance parameters integrated out: what is left for the shared ones.
 //!
-//! With residuals `r`, slopes `A` by the shared numbers `x` and `B` by the clip's own ones `u`, whose prior has the precision `L`,
+//! With residuals `r`, slopes `A` by the shared parameters `x` and `B` by the clip's nuisance parameters `u`, whose prior has
+//! the precision `L`,
 //! `-2 ln` of the likelihood is `|r + A dx + B du|^2 + (u + du)' L (u + du)`, least at `du = -(B'B + L)^-1 (B'r + L u + B'A dx)`.
 //! What remains is a quadratic form in `(1, dx)` (a Schur complement) and the logarithm of the volume that was integrated over:
 //! that of a Gaussian whose covariance is `1 + B L^-1 B'`.
@@ -8,11 +9,11 @@
 use super::problem::Impossible;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// A clip without its own numbers. `P` shared numbers, `Q` own ones.
+/// A clip without its nuisance parameters. `P` shared parameters, `Q` nuisance parameters.
 pub struct Eliminated {
-    /// Over (1, shared numbers), `(1 + P) x (1 + P)`: `-2 ln` of the likelihood but for [`Self::volume`].
+    /// Over (1, shared parameters), `(1 + P) x (1 + P)`: `-2 ln` of the likelihood but for [`Self::volume`].
     pub form: DMatrix<f64>,
-    /// `ln det (B'B + L) - ln det L`; 0 of a clip without own numbers.
+    /// `ln det (B'B + L) - ln det L`; 0 of a clip without nuisance parameters.
     pub volume: f64,
     inner: Option<Cholesky<f64, Dyn>>,
     /// `-(B'B + L)^-1 (B'r + L u, B'A)`, `Q x (1 + P)`.
@@ -20,11 +21,13 @@ pub struct Eliminated {
 }
 
 impl Eliminated {
-    /// From the products of all columns, `gram` over (residual, `A`, `B`), the precisions and the clip's own numbers `u` there, `Q`
+    /// From the products of all columns, `gram` over (residual, `A`, `B`), the precisions and the clip's nuisance parameters `u`
+    /// there, `Q`
     /// each. A number that does not scatter has no slope and any precision, which keeps it where it is.
     ///
     /// # Errors
-    /// [`Impossible`] where a product is not finite, or products are so large that their rounding swallows the precisions, which are
+    /// [`Impossible`] where a product is not finite, or products are so large that their rounding swallows the precisions, which
+    /// are
     /// positive.
     pub fn of(gram: &DMatrix<f64>, precision: &[f64], u: &[f64]) -> Result<Self, Impossible> {
         if !gram.iter().chain(u).all(|number| number.is_finite()) {
@@ -43,7 +46,7 @@ impl Eliminated {
             form[(0, 0)] += precision * u * u;
         }
         let Some(inner) = Cholesky::new(inner) else {
-            return Err(Impossible("slopes by a clip's own numbers are too large to be separated".into()));
+            return Err(Impossible("slopes by a clip's nuisance parameters are too large to be separated".into()));
         };
         let follows = -inner.solve(&cross);
         form += cross.tr_mul(&follows);
@@ -51,17 +54,17 @@ impl Eliminated {
         Ok(Self { form, volume, inner: Some(inner), follows })
     }
 
-    /// By how much the own numbers change to be at their best after a change `dx` of the shared ones, `Q`.
+    /// By how much the nuisance parameters change to be at their best after a change `dx` of the shared ones, `Q`.
     pub fn own_change(&self, dx: &DVector<f64>) -> DVector<f64> {
         &self.follows * dx.clone().insert_row(0, 1.0)
     }
 
-    /// How the own numbers follow (1, the shared ones), `Q x (1 + P)`.
+    /// How the nuisance parameters follow (1, the shared ones), `Q x (1 + P)`.
     pub fn follows(&self) -> &DMatrix<f64> {
         &self.follows
     }
 
-    /// Covariance of the own numbers given the shared ones, `Q x Q`.
+    /// Covariance of the nuisance parameters given the shared ones, `Q x Q`.
     pub fn own_covariance(&self) -> DMatrix<f64> {
         self.inner.as_ref().map_or_else(|| DMatrix::zeros(0, 0), Cholesky::inverse)
     }
@@ -104,7 +107,7 @@ mod tests {
             assert!(Eliminated::of(&(columns.transpose() * &columns), &[], &[]).is_err(), "{large}");
             assert!(Eliminated::of(&(columns.transpose() * &columns), &[1.0], &[0.0]).is_err(), "{large}");
         }
-        // Two own numbers that do the same: their difference is held by the precision of 1 alone.
+        // Two nuisance parameters that do the same: their difference is held by the precision of 1 alone.
         for (slope, holds) in [(1e3, true), (1e20, false)] {
             let columns = DMatrix::from_row_slice(2, 3, &[1.0, slope, slope, 1.0, 3.0 * slope, 3.0 * slope]);
             let left = Eliminated::of(&(columns.transpose() * &columns), &[1.0, 1.0], &[0.0, 0.0]);

@@ -1,4 +1,4 @@
-//! How sure the shared numbers are, in a way that residuals which depend on each other do not fool.
+//! How sure the shared parameters are, in a way that residuals which depend on each other do not fool.
 //!
 //! The information of a fit is right where residuals are independent and as large as their sigmas. They are neither: a
 //! model that is a little wrong leaves residuals that last. So the scores of whole stretches of clips are taken as
@@ -18,7 +18,7 @@ pub fn half_width(level: f64, curvature: f64, scatter: f64, witnesses: usize) ->
     (statistics::normal(level) * curvature).max(by_witnesses)
 }
 
-/// How sure a fit is about its shared numbers.
+/// How sure a fit is about its shared parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Intervals {
     /// Half the interval of each number; infinite where the clips say nothing about it.

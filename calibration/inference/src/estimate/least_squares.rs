@@ -336,12 +336,12 @@ mod tests {
             let stopped = std::cell::RefCell::new(None);
             let start = Place::at_rest(vec![1.0, 0.1], &random, 3);
             let start = begin(&model, (&unknowns, &random), &start, &options).expect("an answer");
-            let told = |now: &Underway<&Fit>| {
+            let watch = |now: &Underway<&Fit>| {
                 *stopped.borrow_mut() = Some(Underway { fit: now.fit.clone(), damping: now.damping });
                 now.fit.history.len() <= steps
             };
-            go_on(&model, (&unknowns, &random), start, &options, told).expect("an answer");
-            let kept = stopped.into_inner().expect("it was told");
+            go_on(&model, (&unknowns, &random), start, &options, watch).expect("an answer");
+            let kept = stopped.into_inner().expect("it was watched");
             let resumed = go_on(&model, (&unknowns, &random), kept, &options, |_| true).expect("an answer");
             assert_eq!((&resumed.shared, &resumed.history), (&whole.shared, &whole.history));
             assert_eq!((resumed.evaluations, resumed.converged), (whole.evaluations, whole.converged));

@@ -1,4 +1,5 @@
-//! One clip around one point: residuals, their slopes by differences, and what is left once the clip's own numbers are eliminated
+//! One clip around one point: residuals, their slopes by differences, and what is left once the clip's nuisance parameters are
+//! eliminated
 //! ([`super::eliminate`]).
 
 use super::eliminate::Eliminated;
@@ -8,30 +9,30 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// A clip, linearised. `P` shared numbers, `Q` own ones.
+/// A clip, linearised. `P` shared parameters, `Q` nuisance parameters.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ClipFit {
     /// Number of residuals.
     pub rows: usize,
     /// Sum of squared residuals.
     pub chi2: f64,
-    /// The clip's own numbers there, `Q`.
+    /// The clip's nuisance parameters there, `Q`.
     pub own: Vec<f64>,
     /// Their covariance given the shared ones, `Q x Q`.
     #[serde(with = "matrix")]
     pub own_covariance: DMatrix<f64>,
-    /// `-2 ln` of the clip's likelihood with the own numbers integrated out, without the constant of the noise.
+    /// `-2 ln` of the clip's likelihood with the nuisance parameters integrated out, without the constant of the noise.
     pub deviance: f64,
-    /// Half the slope of [`Self::deviance`] by the shared numbers, `P` (the volume term taken as constant).
+    /// Half the slope of [`Self::deviance`] by the shared parameters, `P` (the volume term taken as constant).
     #[serde(with = "vector")]
     pub gradient: DVector<f64>,
-    /// Information on the shared numbers, `P x P`.
+    /// Information on the shared parameters, `P x P`.
     #[serde(with = "matrix")]
     pub information: DMatrix<f64>,
     /// What each stretch of the clip adds to [`Self::gradient`]; a single one where the model tells no stretches.
     #[serde(with = "vectors")]
     pub scores: Vec<DVector<f64>>,
-    /// How the own numbers answer to the shared ones and where they want to go: [`ClipFit::own_part_way`].
+    /// How the nuisance parameters answer to the shared ones and where they want to go: [`ClipFit::own_part_way`].
     #[serde(with = "vector")]
     own_step: DVector<f64>,
     #[serde(with = "matrix")]
@@ -42,7 +43,8 @@ impl ClipFit {
     /// Linearises a clip at (`shared`, `own`). Costs `1 + P + Q` evaluations, `Q` counting only random effects that scatter.
     ///
     /// # Errors
-    /// [`Impossible`] when the model has no answer at the point itself, or one that is too large to be squared. A step without an answer is tried the other way,
+    /// [`Impossible`] when the model has no answer at the point itself, or one that is too large to be squared. A step without
+    /// an answer is tried the other way,
     /// and then counts as one that changes nothing.
     pub fn at(
         model: &impl ClipModel,
@@ -100,12 +102,12 @@ impl ClipFit {
         })
     }
 
-    /// Where the own numbers want to go with the shared ones held.
+    /// Where the nuisance parameters want to go with the shared ones held.
     pub fn own_way(&self) -> &DVector<f64> {
         &self.own_step
     }
 
-    /// The own numbers `share` of the way to where a step `dx` of the shared ones brings them.
+    /// The nuisance parameters `share` of the way to where a step `dx` of the shared ones brings them.
     pub fn own_part_way(&self, dx: &DVector<f64>, share: f64) -> Vec<f64> {
         let step = &self.own_step + &self.own_answer * dx;
         self.own.iter().zip(step.iter()).map(|(own, step)| own + share * step).collect()

@@ -7,14 +7,14 @@
 //! | module | owns |
 //! |---|---|
 //! | [`problem`] | the two kinds of unknowns, and the question a model answers: residuals of one clip |
-//! | [`eliminate`] | the likelihood of one clip with its own numbers integrated out |
+//! | [`eliminate`] | the likelihood of one clip with its nuisance parameters integrated out |
 //! | [`linear`] | one clip linearised by differences |
 //! | [`bounded`] | one damped step within bounds |
 //! | [`solve`] | the one loop of such steps, and its schedule |
 //! | [`least_squares`] | all clips on that way |
 //! | [`profile`] | nuisance parameters at their best for shared ones that are given |
 //! | [`quadratic`] | quadratic forms in parameters: minima over chosen ones, elimination of others |
-//! | [`interval`] | how sure the shared numbers are |
+//! | [`interval`] | how sure the shared parameters are |
 //! | [`leverage`] | what a clip says of a fit that does not lean on it |
 //! | [`search`] | search without slopes, and its loop |
 //! | [`swarm`], [`evolution`] | two of them |

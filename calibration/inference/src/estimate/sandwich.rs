@@ -80,17 +80,17 @@ mod tests {
 
     #[test]
     fn the_covariance_is_that_of_the_answers_though_few_witnesses_weigh_unequally() {
-        let (mut square, mut told) = ([0.0; 2], [0.0; 2]);
+        let (mut square, mut stated) = ([0.0; 2], [0.0; 2]);
         for seed in 0..3000 {
             let (at, covariance) = line(seed);
             for k in 0..2 {
                 square[k] += at[k] * at[k];
-                told[k] += covariance[(k, k)];
+                stated[k] += covariance[(k, k)];
             }
         }
         // Of the level all witnesses say alike; the slope is mostly one's.
-        assert!((0.85..1.25).contains(&(told[0] / square[0])), "{}", told[0] / square[0]);
-        assert!((0.7..1.6).contains(&(told[1] / square[1])), "{}", told[1] / square[1]);
+        assert!((0.85..1.25).contains(&(stated[0] / square[0])), "{}", stated[0] / square[0]);
+        assert!((0.7..1.6).contains(&(stated[1] / square[1])), "{}", stated[1] / square[1]);
     }
 
     #[test]

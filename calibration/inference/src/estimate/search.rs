@@ -1,4 +1,4 @@
-//! Search without slopes: whatever asks for points and is told their costs. One loop serves every way of searching, so
+//! Search without slopes: whatever asks for points and is given their costs. One loop serves every way of searching, so
 //! that budget, threads, interruption and resumption are the same for all.
 
 use super::problem::Unknown;
@@ -27,9 +27,9 @@ pub struct Found {
     pub arrived: bool,
 }
 
-/// Searches until `evaluations` costs are told, the search arrives, or `watch` answers `false`.
+/// Searches until `evaluations` costs are known, the search arrives, or `watch` answers `false`.
 ///
-/// `told`: costs of earlier rounds in the order in which they were told; the search is brought back to where it was
+/// `costs_before`: costs of earlier rounds in their order; the search is brought back to where it was
 /// with them. `watch` gets every new round's costs and the best so far.
 ///
 /// ```
@@ -47,13 +47,13 @@ pub fn minimise(
     search: &mut impl Search,
     unknowns: &[Unknown],
     evaluations: usize,
-    told: &[Vec<f64>],
+    costs_before: &[Vec<f64>],
     cost: impl Fn(&[f64]) -> f64 + Sync,
     mut watch: impl FnMut(&[f64], &Found) -> bool,
 ) -> Found {
     let start = unknowns.iter().map(|unknown| unknown.start).collect();
     let mut found = Found { numbers: start, cost: f64::INFINITY, evaluations: 0, history: Vec::new(), arrived: false };
-    let mut earlier = told.iter();
+    let mut earlier = costs_before.iter();
     loop {
         found.arrived = search.arrived();
         if found.arrived || found.evaluations >= evaluations {
@@ -111,9 +111,9 @@ pub(super) mod tests {
         100.0 * (x[1] - x[0] * x[0]).powi(2) + (1.0 - x[0]).powi(2)
     }
 
-    fn lowest(mut search: impl Search, told: &[Vec<f64>], evaluations: usize) -> (Found, Vec<Vec<f64>>) {
-        let mut rounds = told.to_vec();
-        let found = minimise(&mut search, &unknowns(2), evaluations, told, valley, |costs, _| {
+    fn lowest(mut search: impl Search, costs_before: &[Vec<f64>], evaluations: usize) -> (Found, Vec<Vec<f64>>) {
+        let mut rounds = costs_before.to_vec();
+        let found = minimise(&mut search, &unknowns(2), evaluations, costs_before, valley, |costs, _| {
             rounds.push(costs.to_vec());
             true
         });
@@ -133,10 +133,10 @@ pub(super) mod tests {
     fn a_search_goes_on_from_what_it_was_told_before_as_if_it_had_never_stopped() {
         let start = start(&unknowns(2));
         let whole = lowest(Evolution::new(&start, 7), &[], 900).0;
-        let (_, told) = lowest(Evolution::new(&start, 7), &[], 300);
-        assert_eq!(lowest(Evolution::new(&start, 7), &told, 900).0, whole);
+        let (_, costs_before) = lowest(Evolution::new(&start, 7), &[], 300);
+        assert_eq!(lowest(Evolution::new(&start, 7), &costs_before, 900).0, whole);
         let whole = lowest(Swarm::new(&start, 7), &[], 900).0;
-        let (_, told) = lowest(Swarm::new(&start, 7), &[], 300);
-        assert_eq!(lowest(Swarm::new(&start, 7), &told, 900).0, whole);
+        let (_, costs_before) = lowest(Swarm::new(&start, 7), &[], 300);
+        assert_eq!(lowest(Swarm::new(&start, 7), &costs_before, 900).0, whole);
     }
 }

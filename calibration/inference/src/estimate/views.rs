@@ -1,4 +1,4 @@
-//! A model seen another way: its calls counted, its shared numbers given, its residuals shifted, some of its clips alone.
+//! A model seen another way: its calls counted, its shared parameters given, its residuals shifted, some of its clips alone.
 
 use super::problem::{ClipModel, Impossible};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -45,7 +45,7 @@ impl<M: ClipModel> ClipModel for Counted<'_, M> {
     }
 }
 
-/// A model whose shared numbers are given.
+/// A model whose shared parameters are given.
 pub(super) struct Given<'a, M> {
     pub(super) model: &'a M,
     pub(super) shared: &'a [f64],

@@ -69,7 +69,7 @@ pub struct CellClips<'a, F> {
     stepped_from: Vec<Recent<Vec<f64>, Vec<f64>>>,
 }
 
-/// Measured less predicted of a clip, at shared numbers and its own.
+/// Measured less predicted of a clip, at shared parameters and its own.
 type Errors = fn(&ObjectClips, usize, &[f64], &[f64]) -> Result<Vec<f64>, Impossible>;
 
 impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {

@@ -109,7 +109,7 @@ pub(super) fn sureness(found: &Found) -> f64 {
 }
 
 /// Whether a rival of an effect does as well in its place beside all the others that were found: where several act, what one
-/// of them left unexplained makes rivals of it look alike that are told apart once the others are there.
+/// of them left unexplained makes rivals of it look alike that are separated once the others are there.
 fn stands_in<E: Evidence>(case: &Case<'_, E>, step: &Step, effect: usize, rival: usize) -> bool {
     let Case { bench, split, found, .. } = *case;
     let (last, weights) = (&found.last, &found.steps[found.steps.len() - 1].weights);

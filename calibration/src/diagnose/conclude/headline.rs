@@ -98,7 +98,7 @@ fn named(finding: &Finding<'_>, facts: &Facts) -> String {
 }
 
 /// The sentence where what was found is proven, but a part of the gap stays. `share`: what it explains, and whether it is stronger
-/// than what is met in practice; `after`: how large what stays is; `rivals`: effects that do as well as one of those found.
+/// than what is plausible; `after`: how large what stays is; `rivals`: effects that do as well as one of those found.
 pub(super) fn in_part(
     facts: &Facts,
     (share, unusual): (&Share, bool),

@@ -55,7 +55,7 @@ pub(in crate::diagnose) enum Capture {
 pub struct Site {
     /// The session that clips are added to.
     folder: PathBuf,
-    /// What captures are told about the cell.
+    /// What captures know of the cell.
     cell: PathBuf,
     /// The arm that records them, as `--arm` takes it; none where no bridge drives it.
     arm: Option<String>,

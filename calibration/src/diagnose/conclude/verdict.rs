@@ -23,7 +23,7 @@ pub(super) struct Finding<'a> {
     pub(super) left: Vec<Left>,
     /// Whether the gap shrinks on the clips that were kept for confirming.
     pub(super) confirmed: bool,
-    /// Whether an effect is stronger than what is met in practice.
+    /// Whether an effect is stronger than what is plausible.
     pub(super) implausible: bool,
     /// Whether the gap is of no interest without effects, and with them.
     pub(super) within_tolerance: [bool; 2],
@@ -68,7 +68,7 @@ impl Verdict {
 /// So near its limit a confidence is shown as the limit [1]: half a percent, as it is printed.
 const SHOWN_AS_THE_LIMIT: f64 = 0.005;
 
-/// What is stronger than what is met in practice is believed where it explains this much [%]: a substitute does not.
+/// What is stronger than what is plausible is believed where it explains this much [%]: a substitute does not.
 const BELIEVED_BEYOND_RANGE: f64 = 99.5;
 
 /// What is less likely than not is not named [1].

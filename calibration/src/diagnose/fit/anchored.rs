@@ -30,7 +30,7 @@ struct Around {
     nothing: Vec<f64>,
     /// Residuals there, clip by clip.
     there: Vec<Recent<Vec<f64>, Vec<f64>>>,
-    /// By which kept work is told from that around other points.
+    /// What separates kept work from that around other points.
     label: String,
 }
 

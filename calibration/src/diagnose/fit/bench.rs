@@ -26,7 +26,7 @@ pub struct Bench<'a, E> {
     pub trail: Trail<'a>,
 }
 
-/// Clips, each with its own numbers.
+/// Clips, each with its nuisance parameters.
 pub(in crate::diagnose) type Clips = Vec<(usize, Vec<f64>)>;
 
 /// A clip at a hypothesis.
@@ -35,11 +35,11 @@ pub(in crate::diagnose) type Clips = Vec<(usize, Vec<f64>)>;
 pub struct FittedClip<V = WithOwn> {
     /// Index of the clip.
     pub clip: usize,
-    /// Its own numbers.
+    /// Its nuisance parameters.
     pub own: Vec<f64>,
-    /// Over (residual, free numbers), weighted, own numbers eliminated.
+    /// Over (residual, free numbers), weighted, nuisance parameters eliminated.
     pub reduced: Reduced,
-    /// Whether clips have own numbers at all.
+    /// Whether clips have nuisance parameters at all.
     #[serde(skip)]
     pub kind: PhantomData<V>,
 }
@@ -59,7 +59,7 @@ pub(super) struct Reached {
     pub(super) turned_round: bool,
 }
 
-/// A hypothesis with its numbers, of a bench whose clips have own numbers or have none: the other kind of bench takes its numbers
+/// A hypothesis with its numbers, of a bench whose clips have nuisance parameters or have none: the other kind of bench takes its numbers
 /// alone ([`Bench::fit`] from there), never the hypothesis.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(bound = "")]
@@ -84,20 +84,20 @@ impl<V> Hypothesis<V> {
         self.fitted.iter().map(FittedClip::deviance).sum()
     }
 
-    /// A clip's own numbers where it was fitted, else at rest.
+    /// A clip's nuisance parameters where it was fitted, else at rest.
     pub fn own(&self, clip: usize, count: usize) -> Vec<f64> {
         let fitted = self.fitted.iter().find(|fitted| fitted.clip == clip);
         fitted.map_or_else(|| vec![0.0; count], |fitted| fitted.own.clone())
     }
 }
 
-/// An effect weaker than this share of the strongest that is met in practice is none: two engines with other steps and other
+/// An effect weaker than this share of the strongest that is plausible is none: two engines with other steps and other
 /// rules of integration differ by as much (0.35 % of a rotor's inertia and 0.02 % of viscous friction, measured on sessions
 /// of another engine with nothing wrong).
 const NEGLIGIBLE_SHARE: f64 = 0.008;
 /// A control period and a half [s].
 const DELAY_OF_CONVENTION: f64 = 1.5e-3;
-/// Steps in which a clip finds its own numbers.
+/// Steps in which a clip finds its nuisance parameters.
 const PROFILE_STEPS: usize = 2;
 
 /// Share of the strongest from which on an effect counts. What fades out towards infinity, as a gear's stiffness, is met
@@ -129,7 +129,7 @@ impl<E: Likelihood> Bench<'_, E> {
         self.library.baseline.clone().chain(effects.iter().flat_map(of_effect)).collect()
     }
 
-    /// Fits effects on clips from `full` on, each clip's own numbers from `near` on.
+    /// Fits effects on clips from `full` on, each clip's nuisance parameters from `near` on.
     ///
     /// `None` when the twin has no answer at the start.
     pub fn fit(
@@ -163,7 +163,7 @@ impl<E: Likelihood> Bench<'_, E> {
         let free = if effort.frees_held { self.all_free(effects) } else { self.free(effects) };
         let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
         let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
-        let clips = self.own_fitted(&full, from, weights)?;
+        let clips = self.profiled(&full, from, weights)?;
         let clips = self.restarted(&full, clips, weights);
         let before_last = Effort { iterations: effort.iterations.saturating_sub(1), ..effort };
         let (Reached { full, clips, .. }, last) = self.descended((full, clips), &moving, weights, before_last)?;
@@ -227,7 +227,7 @@ impl<E: Likelihood> Bench<'_, E> {
         self.fit((&effects, full), clips, weights, Some(from), effort)
     }
 
-    /// `full` with the candidate as strong as the score test says, within what is met in practice.
+    /// `full` with the candidate as strong as the score test says, within what is plausible.
     pub fn begun(&self, mut full: Vec<f64>, scored: &Scored) -> Vec<f64> {
         let alternative = &self.library.candidates[scored.candidate].alternatives[scored.alternative];
         for (k, value) in &alternative.form {
@@ -257,7 +257,7 @@ impl<E: Likelihood> Bench<'_, E> {
         full
     }
 
-    /// Clips that were not fitted, at a hypothesis' numbers with their own ones at their best.
+    /// Clips that were not fitted, at a hypothesis' numbers with their nuisance parameters at their best.
     pub fn judge(
         &self,
         hypothesis: &Hypothesis<E::Own>,
@@ -276,7 +276,7 @@ impl<E: Likelihood> Bench<'_, E> {
     ) -> Option<Vec<FittedClip<E::Own>>> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
-        let at = self.own_fitted(&hypothesis.full, clips, weights)?;
+        let at = self.profiled(&hypothesis.full, clips, weights)?;
         let at = self.restarted(&hypothesis.full, at, weights);
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
         let forms = swept.reduced(self.evidence, weights).ok()?;
@@ -289,8 +289,8 @@ impl<E: Likelihood> Bench<'_, E> {
         Some(judged.collect())
     }
 
-    /// Clips with their own numbers at their best for shared ones that are given.
-    pub(super) fn own_fitted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Option<Clips> {
+    /// Clips with their nuisance parameters at their best for shared ones that are given.
+    pub(super) fn profiled(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Option<Clips> {
         let steps = if self.scatter.count() == 0 { 0 } else { PROFILE_STEPS };
         for _ in 0..steps {
             let swept = self.linearise(full, &[], &clips, Precision::Exact)?;

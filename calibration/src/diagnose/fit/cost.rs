@@ -1,11 +1,11 @@
-//! What clips cost at numbers: squared weighted residuals, and the clips' own numbers in their sigmas.
+//! What clips cost at numbers: squared weighted residuals, and the clips' nuisance parameters in their sigmas.
 
 use super::bench::Bench;
 use inference::likelihood::Likelihood;
 use rayon::prelude::*;
 
 impl<E: Likelihood> Bench<'_, E> {
-    /// Sum of squared weighted residuals and of the own numbers in their sigmas.
+    /// Sum of squared weighted residuals and of the nuisance parameters in their sigmas.
     pub(in crate::diagnose) fn cost(&self, full: &[f64], clips: &[(usize, Vec<f64>)], weights: &[f64]) -> Option<f64> {
         Some(self.costs(full, clips, weights)?.iter().sum::<f64>()).filter(|cost| cost.is_finite())
     }
@@ -26,7 +26,7 @@ impl<E: Likelihood> Bench<'_, E> {
         clips.par_iter().map(one).collect()
     }
 
-    /// The cost of clips with their own numbers at rest: where these were fitted they hide a part of the gap.
+    /// The cost of clips with their nuisance parameters at rest: where these were fitted they hide a part of the gap.
     pub fn plain_cost(&self, clips: &[usize], full: &[f64], weights: &[f64]) -> Option<f64> {
         let nothing = vec![0.0; self.scatter.count()];
         let clips: Vec<_> = clips.iter().map(|clip| (*clip, nothing.clone())).collect();

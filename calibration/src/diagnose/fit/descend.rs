@@ -100,7 +100,7 @@ impl<E: Likelihood> Problem for Moving<'_, E> {
         let own = |clip: &super::sweep::SweptClip| {
             Some((clip.clip, at.own_after(clip, bench.evidence, weights, trial.step).ok()?))
         };
-        let clips = bench.own_fitted(&full, at.clips.iter().map(own).collect::<Option<_>>()?, weights)?;
+        let clips = bench.profiled(&full, at.clips.iter().map(own).collect::<Option<_>>()?, weights)?;
         let clips = bench.restarted(&full, clips, weights);
         let cost = bench.cost(&full, &clips, weights)?;
         let turned_round = full != straight;

@@ -51,7 +51,7 @@ fn weight(evidence: &impl Likelihood, clips: &[(usize, Vec<f64>)], channel: usiz
     (power * length).sqrt().recip()
 }
 
-/// What the richest hypothesis leaves: all numbers and every candidate's best form at once, each clip's own numbers at
+/// What the richest hypothesis leaves: all numbers and every candidate's best form at once, each clip's nuisance parameters at
 /// their best.
 ///
 /// # Errors
@@ -84,7 +84,7 @@ pub fn richest_residuals(
     residuals_at(swept, evidence, weights, &free, &at)
 }
 
-/// Residuals of a sweep's clips at coefficients of some columns, each clip's own numbers at their best; not weighted.
+/// Residuals of a sweep's clips at coefficients of some columns, each clip's nuisance parameters at their best; not weighted.
 ///
 /// # Errors
 /// As of [`Swept::own_after`].

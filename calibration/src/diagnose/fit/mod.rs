@@ -9,7 +9,7 @@
 //! | `bench`, `cost`, `effort` | hypotheses fitted, what they cost, and how much work a fit gets |
 //! | `descend` | the steps of a fit |
 //! | `left_out` | the numbers without some of the clips |
-//! | `restart` | restarts of clips whose own numbers are stuck in a local minimum |
+//! | `restart` | restarts of clips whose nuisance parameters are stuck in a local minimum |
 //! | `parameters`, `undetermined` | its numbers with their intervals, and those that nothing depends on |
 //! | `time_step` | how far the twin's time step moves them |
 //! | `stages` | how long each part of the search takes |

@@ -1,8 +1,8 @@
-//! Restarts of clips whose own numbers are stuck in a local minimum.
+//! Restarts of clips whose nuisance parameters are stuck in a local minimum.
 //!
 //! An object that is touched twice in the twin and once in the clip, or the other way round, is off by centimetres, and no
 //! slope leads from one to the other, though a little more friction in that clip would. So clips that stand out are tried
-//! some way along each of their own numbers too.
+//! some way along each of their nuisance parameters too.
 
 use super::bench::{Bench, Clips};
 use super::sweep::Precision;
@@ -14,13 +14,13 @@ use nalgebra::DVector;
 /// so much more.
 const OUTLIER_DISTANCE: f64 = 4.0;
 const MIN_EXCESS_COST: f64 = 100.0;
-/// Where along each of its own numbers it is tried [sigma], and what share of that is then kept: the way back to the likeliest
+/// Where along each of its nuisance parameters it is tried [sigma], and what share of that is then kept: the way back to the likeliest
 /// value may lead over the edge again.
 const RESTART_SIGMAS: [f64; 4] = [-5.0, -2.5, 2.5, 5.0];
 const KEPT_SHARES: [f64; 2] = [0.5, 1.0];
 
 impl<E: Likelihood> Bench<'_, E> {
-    /// Clips with their own numbers, those that stand out where they cost least; those without an answer as they were.
+    /// Clips with their nuisance parameters, those that stand out where they cost least; those without an answer as they were.
     pub(in crate::diagnose) fn restarted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Clips {
         if self.scatter.count() == self.scatter.heavy.len() {
             return clips;
@@ -36,7 +36,7 @@ impl<E: Likelihood> Bench<'_, E> {
         clips
     }
 
-    /// What a clip costs where it costs least some way along its own numbers, and these. What has heavy tails follows by one
+    /// What a clip costs where it costs least some way along its nuisance parameters, and these. What has heavy tails follows by one
     /// step: it acts evenly.
     fn elsewhere(&self, full: &[f64], clip: usize, weights: &[f64]) -> Option<(f64, Vec<f64>)> {
         let even = &self.scatter.heavy;

@@ -23,7 +23,7 @@ pub struct Scored {
     pub cost: usize,
     /// Cosine between its signature and what is left of the residual.
     pub cosine: f64,
-    /// Its signal at the strongest that is met in practice, in sigmas, what baseline numbers can imitate taken out.
+    /// Its signal at the strongest that is plausible, in sigmas, what baseline numbers can imitate taken out.
     pub signal: f64,
     /// Share of that signal's power that baseline numbers imitate.
     pub imitated: f64,

@@ -5,7 +5,7 @@
 //! clip to clip is eliminated with its prior ([`Swept::reduced`]), so that what remains is a quadratic form in the shared
 //! numbers and the probes' units alone.
 //!
-//! Numbers of different joints are turned in one simulation and told apart by the joint in which they show
+//! Numbers of different joints are turned in one simulation and separated by the joint in which they show
 //! ([`Precision::Joints`]): a stiff controller leaves little of one joint in another. That costs a seventh of turning
 //! them one by one ([`Precision::Exact`]).
 
@@ -31,7 +31,7 @@ pub enum Column {
 /// How columns are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Precision {
-    /// Joints together, each told by its own channels.
+    /// Joints together, each seen in its own channels.
     Joints,
     /// One simulation for each column; for those of all joints where these move without one another.
     Exact,
@@ -42,9 +42,9 @@ pub enum Precision {
 pub struct SweptClip {
     /// Index of the clip.
     pub clip: usize,
-    /// Column 0 the residuals, then [`Swept::columns`], then the clip's own numbers.
+    /// Column 0 the residuals, then [`Swept::columns`], then the clip's nuisance parameters.
     pub matrix: DMatrix<f64>,
-    /// The clip's own numbers there.
+    /// The clip's nuisance parameters there.
     pub own: Vec<f64>,
 }
 
@@ -58,15 +58,15 @@ pub struct Swept {
     pub clips: Vec<SweptClip>,
 }
 
-/// One clip with its own numbers eliminated.
+/// One clip with its nuisance parameters eliminated.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Reduced {
     /// Quadratic form over (residual, columns).
     #[serde(with = "matrix")]
     pub form: DMatrix<f64>,
-    /// Logarithm of the volume that the own numbers were integrated over; part of the deviance.
+    /// Logarithm of the volume that the nuisance parameters were integrated over; part of the deviance.
     pub volume: f64,
-    /// The clip around its own numbers.
+    /// The clip around its nuisance parameters.
     pub around: Around,
 }
 
@@ -76,7 +76,7 @@ pub struct Point<'a> {
     pub free: &'a [usize],
     /// Candidates to probe.
     pub probed: &'a [usize],
-    /// Clips, each with its own numbers.
+    /// Clips, each with its nuisance parameters.
     pub clips: &'a [(usize, Vec<f64>)],
     /// How columns are taken.
     pub precision: Precision,
@@ -88,8 +88,8 @@ type Batch = Vec<usize>;
 /// Linearises.
 ///
 /// # Errors
-/// [`Impossible`] when the point itself has no answer, or `go_on` says no; it is told, before each simulation, which share of a
-/// clip's that is. A column without an answer counts as one that changes nothing.
+/// [`Impossible`] when the point itself has no answer, or `go_on` says no; it is given, before each simulation, the share of a clip
+/// that it is. A column without an answer counts as one that changes nothing.
 pub fn sweep(
     evidence: &impl Likelihood,
     library: &Library,
@@ -209,7 +209,7 @@ impl<E: Likelihood, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         batch.iter().zip(&units).map(column).collect()
     }
 
-    /// What the columns of a batch can change; several joints at once are told apart by the arm alone.
+    /// What the columns of a batch can change; several joints at once are separated by the arm alone.
     fn reach(&self, batch: &[usize], numbers: &[f64]) -> Reach {
         let number = |k: &usize| match self.columns[*k] {
             Column::Number(k) => k,
@@ -260,7 +260,7 @@ impl<E: Likelihood, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
 }
 
 impl Swept {
-    /// Each clip with channel weights and its own numbers eliminated.
+    /// Each clip with channel weights and its nuisance parameters eliminated.
     ///
     /// # Errors
     /// As of [`Eliminated::of`].
@@ -270,7 +270,7 @@ impl Swept {
 
     fn reduce(&self, clip: &SweptClip, evidence: &impl Likelihood, weights: &[f64]) -> Result<Reduced, Impossible> {
         let gram = gram(clip, evidence, weights);
-        // The residual and the clip's own numbers, without the columns between them.
+        // The residual and the clip's nuisance parameters, without the columns between them.
         let of_clip = |k: usize| if k == 0 { 0 } else { self.columns.len() + k };
         let alone = 1 + self.scatter.count();
         let alone = DMatrix::from_fn(alone, alone, |i, k| gram[(of_clip(i), of_clip(k))]);
@@ -284,7 +284,7 @@ impl Swept {
         Eliminated::of(gram, &self.scatter.precision(&clip.own), &clip.own)
     }
 
-    /// A clip's own numbers at their best for coefficients of all columns.
+    /// A clip's nuisance parameters at their best for coefficients of all columns.
     ///
     /// # Errors
     /// As of [`Eliminated::of`].

@@ -64,7 +64,7 @@ impl Residuals {
         Self::each(bench, &clips.iter().map(|clip| (*clip, &hypothesis.full[..])).collect::<Vec<_>>())
     }
 
-    /// Of clips that were not fitted, each at its own numbers.
+    /// Of clips that were not fitted, each at its nuisance parameters.
     pub fn of<E: Evidence>(bench: &Bench<'_, E>, fits: &[(Hypothesis, Vec<usize>)]) -> Option<Self> {
         let clips = fits.iter().flat_map(|(fit, clips)| clips.iter().map(|clip| (*clip, &fit.full[..])));
         Self::each(bench, &clips.collect::<Vec<_>>())

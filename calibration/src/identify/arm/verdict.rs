@@ -106,7 +106,7 @@ fn commanded(joint: usize, model: &Model<'_>, clips: &Used) -> f64 {
     clips.split.train.iter().map(travel).fold(0.0, f64::max)
 }
 
-/// Width of what is met in practice on this arm.
+/// Width of what is plausible on this arm.
 fn met_width(model: &Model<'_>, setting: &Setting) -> Option<f64> {
     let Setting::Effect { name, parameter, index, inverse } = setting else { return None };
     let parameter = find(name)?.parameters.iter().find(|p| p.name == *parameter)?;

@@ -111,7 +111,7 @@ impl Motions<'_> {
         [unknown("dry_friction", 0, 2.0 * held), unknown("viscous_friction", 1, 0.0)]
     }
 
-    /// The own numbers of each motion: its start.
+    /// The nuisance parameters of each motion: its start.
     pub(super) fn own() -> [Random; 2] {
         ["position at the start", "velocity at the start"].map(|name| Random {
             name: name.into(),

@@ -1,4 +1,4 @@
-//! The likelihood fit: shared numbers by least squares, and between its rounds how wrong the simulated hit is, from the
+//! The likelihood fit: shared parameters by least squares, and between its rounds how wrong the simulated hit is, from the
 //! clips themselves.
 //!
 //! A hit is rough: where tool and object part by a hair's breadth, a little more of any number moves the resting place by
@@ -189,7 +189,7 @@ fn held(clips: &ObjectClips) -> Vec<Random> {
     clips.random().random.into_iter().map(|effect| Random { sigma: 0.0, ..effect }).collect()
 }
 
-/// What is left of hits and rests with every clip's own numbers at their best. Of a clip that nothing fits, as much as
+/// What is left of hits and rests with every clip's nuisance parameters at their best. Of a clip that nothing fits, as much as
 /// it counts.
 fn model_error(clips: &ObjectClips, at: &Linearised) -> Result<ModelError, Impossible> {
     let own = at.own();

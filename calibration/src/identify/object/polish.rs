@@ -52,7 +52,7 @@ pub(super) fn fit_polished(
         let free = |setting: &Setting| !matches!(setting, Setting::Mass | Setting::CentreOfMass(2));
         polish(&loss, searched, (&found.at, free), trail, |numbers, more| watch(numbers, found.evaluations + more))
     };
-    // How much wider intervals are was told where the deviance is least; here it may fall to a side.
+    // How much wider intervals are is known where the deviance is least; here it may fall to a side.
     let at = linearise_object(clips, searched.unknowns, &numbers)?;
     Ok(ObjectFit { evaluations: found.evaluations + more + at.evaluations, at, ..found })
 }

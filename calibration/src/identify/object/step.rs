@@ -1,4 +1,4 @@
-//! One step of the shared numbers, every clip's own ones at their best before and after it.
+//! One step of the shared parameters, every clip's nuisance parameters at their best before and after it.
 //!
 //! Own numbers are cheap (they cost a slide, not a hit) and must not hold up the shared ones: a clip whose slide begins
 //! elsewhere than simulated finds its own way first. A clip that nothing fits counts less, so that it does not steer
@@ -17,16 +17,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy)]
 pub(super) struct Question<'a> {
     pub(super) clips: &'a ObjectClips,
-    /// The shared numbers.
+    /// The shared parameters.
     pub(super) unknowns: &'a [Unknown],
-    /// The own ones.
+    /// The nuisance parameters.
     pub(super) random: &'a [Random],
 }
 
-/// All clips around one point, own numbers at their best.
+/// All clips around one point, nuisance parameters at their best.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Linearised {
-    /// The shared numbers.
+    /// The shared parameters.
     pub(super) shared: Vec<f64>,
     /// The clips there.
     pub(super) clips: Vec<ClipFit>,
@@ -53,19 +53,19 @@ impl Linearised {
         self.clips.iter().zip(&self.weights).map(|(clip, weight)| weight * clip.deviance).sum()
     }
 
-    /// The clips' own numbers.
+    /// The clips' nuisance parameters.
     pub(super) fn own(&self) -> Vec<Vec<f64>> {
         self.clips.iter().map(|clip| clip.own.clone()).collect()
     }
 
-    /// Information on the shared numbers.
+    /// Information on the shared parameters.
     pub(super) fn information(&self) -> DMatrix<f64> {
         let n = self.shared.len();
         let parts = self.clips.iter().zip(&self.weights);
         parts.fold(DMatrix::zeros(n, n), |sum, (clip, weight)| sum + &clip.information * *weight)
     }
 
-    /// The estimate of the shared numbers to first order: the clips as much as each counts, wanting what they would want
+    /// The estimate of the shared parameters to first order: the clips as much as each counts, wanting what they would want
     /// had they been left out; which numbers rest on a bound; how sure the others are.
     pub(super) fn estimate(&self, unknowns: &[Unknown]) -> (Fit, Vec<bool>, Intervals) {
         let mut clips = self.clips.clone();
@@ -105,7 +105,7 @@ impl Question<'_> {
         Ok(Linearised { small: end != End::Stopped, evaluations: strokes.evaluations, ..at })
     }
 
-    /// The clips linearised at `shared`, own numbers at their best.
+    /// The clips linearised at `shared`, nuisance parameters at their best.
     ///
     /// # Errors
     /// As [`Self::improved`].

@@ -73,7 +73,7 @@ pub fn shots(session: &Session, kind: PictureKind, wanted: usize) -> anyhow::Res
 /// The camera of a session's pictures.
 #[derive(Debug, Default)]
 pub struct OwnCamera {
-    /// By its bags, with the cell's own numbers where it has some; `None` where no bag says anything.
+    /// By its bags, with the cell's parameters where it has some; `None` where no bag says anything.
     pub camera: Option<Calibration>,
     /// What is to be said about it.
     pub remarks: Vec<String>,

@@ -131,8 +131,8 @@ impl ArmClip {
         if rate < MIN_RATE {
             return Err(ArmClipError::Slow(rate));
         }
-        let (told, rows) = (&recorded.desired.stamps_ns, &recorded.measured.stamps_ns);
-        if told.last() < rows.first() || rows.last() < told.first() {
+        let (commanded, rows) = (&recorded.desired.stamps_ns, &recorded.measured.stamps_ns);
+        if commanded.last() < rows.first() || rows.last() < commanded.first() {
             return Err(ArmClipError::Apart);
         }
         let dead = dead_joints(&recorded);

@@ -113,7 +113,7 @@ pub fn is_tracking(cell: &Cell) -> bool {
 
 impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// Means over recorded clips of a cell in their order, and those that cannot be used. `theta` gives the parameters that go with
-    /// shared numbers.
+    /// shared parameters.
     ///
     /// # Errors
     /// [`ModelError`] when the cell has no arm that can be simulated.
@@ -256,7 +256,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
         Ok(peaks)
     }
 
-    /// What the sensors would have read at every measured row of a clip, at shared numbers and its own, with every control period
+    /// What the sensors would have read at every measured row of a clip, at shared parameters and its own, with every control period
     /// integrated in `parts`; rows that are not simulated are left at zero.
     ///
     /// # Errors

@@ -40,9 +40,9 @@ pub fn sigma(signal: &[f64]) -> f64 {
 /// One sigma of a sensor from that of its signal in each of several clips: what holds for most. A clip in which the reading
 /// never changes has 0 and says nothing: the joint stood still, and what moves it less than a step is not seen.
 pub fn of_clips(sigmas: impl Iterator<Item = f64>) -> f64 {
-    let mut told: Vec<f64> = sigmas.filter(|sigma| *sigma > 0.0).collect();
-    told.sort_unstable_by(f64::total_cmp);
-    told.get(told.len() / 2).copied().unwrap_or_default()
+    let mut known: Vec<f64> = sigmas.filter(|sigma| *sigma > 0.0).collect();
+    known.sort_unstable_by(f64::total_cmp);
+    known.get(known.len() / 2).copied().unwrap_or_default()
 }
 
 /// Smallest step between neighbouring samples; 0 where nothing ever changes.
