@@ -5,9 +5,8 @@
 //! by itself ([`shared_mem::parent`]). Called by capture, demo and sweep.
 
 use rustix::process::{Pid, Signal, kill_process_group};
-use shared_mem::child_output;
-use shared_mem::parent;
 use shared_mem::transport::DOMAIN_VARIABLE;
+use shared_mem::{child_output, parent};
 use std::collections::VecDeque;
 use std::ffi::OsString;
 use std::io::Read;

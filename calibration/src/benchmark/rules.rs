@@ -9,9 +9,8 @@
 use super::score::Said;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::floor;
-use crate::diagnose::fit::shortlist;
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
+use crate::diagnose::fit::{floor, shortlist};
 use inference::admit::Split;
 use inference::estimate::quadratic::minimum;
 use inference::likelihood::Evidence;

@@ -1,8 +1,7 @@
 //! A whole benchmark: draws the worlds, records their sessions, has them diagnosed.
 
-use super::rules;
 use super::score::Method;
-use super::trial;
+use super::{rules, trial};
 use inference::interrupt::Interrupt;
 use shared_mem::cell::Cell;
 use shared_mem::console;

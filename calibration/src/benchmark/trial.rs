@@ -15,11 +15,10 @@ use crate::diagnose::{DiagnoseError, Diagnosis, Kind, Options, diagnose_clips, p
 use inference::admit::{Admitted, Refused, Split};
 use inference::interrupt::Interrupt;
 use inference::kept::Kept;
-use inference::likelihood::Evidence;
 use inference::likelihood::arm::ArmClips;
 use inference::likelihood::cell::CellClips;
 use inference::likelihood::object::ObjectClips;
-use inference::likelihood::setting;
+use inference::likelihood::{Evidence, setting};
 use shared_mem::cell::{ClipEntry, ClipKind};
 use shared_mem::progress::Progress;
 use shared_mem::recording::{Clip, Session, SessionFiles};

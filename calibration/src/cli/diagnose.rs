@@ -6,11 +6,10 @@ use calibration::diagnose::conclude::written;
 use calibration::diagnose::{Diagnosis, Options, diagnose_kept};
 use calibration::report;
 use inference::interrupt::Interrupt;
-use shared_mem::console;
 use shared_mem::output::Destination;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
-use shared_mem::typed;
+use shared_mem::{console, typed};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

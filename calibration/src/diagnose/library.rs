@@ -12,8 +12,7 @@ use inference::likelihood::setting::{self, Setting, Settings};
 use shared_mem::cell::Cell;
 use shared_mem::theta::Theta;
 use std::ops::Range;
-use twin::arm::ArmModel;
-use twin::arm::Joints;
+use twin::arm::{ArmModel, Joints};
 use twin::effects::{EffectInfo, OnTable, Place, Robot, Role, Search, Shape, Stage, find, registry};
 
 /// All numbers of all hypotheses.

@@ -1,9 +1,7 @@
 //! The robot's URDF: a file, a xacro file that the program `xacro` expands, or the text that a bag holds.
 
 use anyhow::{Context as _, bail, ensure};
-use shared_mem::child_output;
-use shared_mem::input;
-use shared_mem::printable;
+use shared_mem::{child_output, input, printable};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -7,8 +7,7 @@ use crate::answer::diagnosis::{Candidate, Diagnosis, Kind, Status, TorqueRms};
 use crate::answer::identification::{Identification, Parameter};
 use crate::benchmark::calibrate::Regenerated;
 use crate::benchmark::score::{Method, Scores};
-use crate::diagnose::against::change;
-use crate::diagnose::against::{Candidate as Compared, Comparison};
+use crate::diagnose::against::{Candidate as Compared, Comparison, change};
 use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 use crate::words::parameters::{of_joints, part};
 use crate::words::quantity::{Unit, short, span};
@@ -237,8 +236,7 @@ fn table(rows: Vec<Vec<String>>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::answer::identification::Figures;
-    use crate::answer::identification::{Gap, NotIdentifiable};
+    use crate::answer::identification::{Figures, Gap, NotIdentifiable};
     use std::collections::BTreeMap;
 
     #[test]

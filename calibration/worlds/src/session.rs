@@ -4,11 +4,9 @@
 
 use crate::world::{Kind, Outside, World};
 use capture::body::Body;
-use capture::limits;
-use capture::plan;
 use capture::program::{Program, SPEEDS, Standing, Wish};
 use capture::request::{self, Request};
-use capture::stroke;
+use capture::{limits, plan, stroke};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution as _, StandardNormal};

@@ -6,14 +6,13 @@
 //! costs no simulation; its scale is what an effect must beat to be believed
 //! ([`super::random_effects_scale`]).
 
-use super::Setting;
 use super::arm::ArmClips;
 use super::arm::following::Moment;
 use super::contact::Contact;
 use super::object::{self, ModelError, ObjectClips, Part, diagnosed};
 use super::random_effects::{RandomEffects, WithOwn};
 use super::recent::Recent;
-use super::{Channel, Group, Likelihood, Near, Reach, Row, StageName};
+use super::{Channel, Group, Likelihood, Near, Reach, Row, Setting, StageName};
 use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible};
 use shared_mem::cell::{ClipKind, PoseNoise};

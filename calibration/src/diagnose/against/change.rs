@@ -2,8 +2,7 @@
 
 use super::{Smallest, Values};
 use crate::words::parameters::{of_joints, part};
-use crate::words::quantity::span;
-use crate::words::quantity::{Unit, short};
+use crate::words::quantity::{Unit, short, span};
 use crate::words::words;
 
 /// Most numbers that a line names one by one.

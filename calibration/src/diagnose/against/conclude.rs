@@ -20,8 +20,7 @@ use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::localise;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes::Sizes;
-use inference::likelihood::Evidence;
-use inference::likelihood::Setting;
+use inference::likelihood::{Evidence, Setting};
 use shared_mem::recording::Session;
 use std::collections::BTreeMap;
 

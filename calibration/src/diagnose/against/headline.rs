@@ -4,8 +4,7 @@ use super::answer::{Candidate, Smallest, Values};
 use super::search::Trial;
 use crate::answer::diagnosis::{Kind, Place, Share, Status};
 use crate::diagnose::against::change::{between, smallest_in_words};
-use crate::words::words;
-use crate::words::{channel_in_words, percent};
+use crate::words::{channel_in_words, percent, words};
 
 /// What the sentence is made of.
 pub(super) struct Facts {

@@ -1,8 +1,7 @@
 //! Whether two sessions can be held against each other, and their clips as those of one cell.
 
-use inference::admit::by_command;
 use inference::admit::torques::is_tracking;
-use inference::admit::{Admitted, Refused, admit};
+use inference::admit::{Admitted, Refused, admit, by_command};
 use shared_mem::cell::{Cell, ControllerKind, Object};
 use shared_mem::recording::Session;
 use twin::arm::ArmModel;

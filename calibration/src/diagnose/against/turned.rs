@@ -5,9 +5,8 @@
 
 use super::super::library::Library;
 use inference::estimate::{ClipModel, Impossible, Unknown};
-use inference::likelihood::Setting;
 use inference::likelihood::random_effects::{RandomEffects, WithOwn};
-use inference::likelihood::{Channel, Evidence, Likelihood, Near, Row};
+use inference::likelihood::{Channel, Evidence, Likelihood, Near, Row, Setting};
 
 /// One of the two sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

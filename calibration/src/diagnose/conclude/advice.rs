@@ -4,8 +4,7 @@
 //! show in decide. What no capture can do, a weight to be hung or an object to be put somewhere, stands in the sentence first.
 
 use super::site::{Advice, Capture, Site};
-use crate::words::channel_in_words;
-use crate::words::words;
+use crate::words::{channel_in_words, words};
 use capture::arm_motion::ArmMotion;
 use capture::request::Kind;
 use twin::effects::{Experiment, Separation, Stage, find};

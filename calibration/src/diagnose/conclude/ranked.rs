@@ -9,9 +9,8 @@ use crate::answer::diagnosis::{Candidate, Share, Status};
 use crate::diagnose::Kind;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::parameters;
 use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
-use crate::diagnose::fit::time_step;
+use crate::diagnose::fit::{parameters, time_step};
 use crate::diagnose::judge::gap::{Residuals, SHRINK_OF_A_DOUBLED_GAP};
 use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::judge::{confidence, held_out};

@@ -4,12 +4,10 @@
 use crate::answer::diagnosis::NextMotion;
 use capture::arm_motion::ArmMotion;
 use capture::body::Body;
-use capture::excitation;
-use capture::limits;
-use capture::pace;
 use capture::plan::plan;
 use capture::rate::RATE;
 use capture::request::Request;
+use capture::{excitation, limits, pace};
 use shared_mem::msg::motion::SetPoint;
 use shared_mem::msg::{Joints, MAX_JOINTS, joints_from};
 use shared_mem::output::{Destination, OutputError};

@@ -139,8 +139,7 @@ mod tests {
     use inference::estimate::ClipModel;
     use inference::interrupt::Interrupt;
     use inference::likelihood::random_effects::{RandomEffects, WithOwn};
-    use inference::likelihood::setting;
-    use inference::likelihood::{Channel, Group, Row, StageName};
+    use inference::likelihood::{Channel, Group, Row, StageName, setting};
     use shared_mem::msg::MAX_JOINTS;
     use std::sync::atomic::{AtomicUsize, Ordering};
 

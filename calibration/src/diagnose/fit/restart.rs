@@ -80,8 +80,7 @@ mod tests {
     use inference::estimate::{ClipModel, Impossible, Random};
     use inference::interrupt::Interrupt;
     use inference::likelihood::random_effects::{RandomEffects, WithOwn};
-    use inference::likelihood::setting;
-    use inference::likelihood::{Channel, Group, Row, StageName};
+    use inference::likelihood::{Channel, Group, Row, StageName, setting};
     use shared_mem::msg::MAX_JOINTS;
 
     const SIGMA: f64 = 0.02;

@@ -5,8 +5,7 @@
 use super::{Around, along_motion, ripple};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
-use inference::likelihood::Likelihood;
-use inference::likelihood::Setting;
+use inference::likelihood::{Likelihood, Setting};
 use twin::effects::{Search, Stage};
 
 /// Shares of the strongest plausible size at which candidates are tried (choices): one beyond the arm beside where its slope points; one

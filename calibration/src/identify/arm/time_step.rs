@@ -55,12 +55,10 @@ pub(super) fn taken_out(fit: &mut Fit, unknowns: &[Unknown], error: &[f64]) -> V
 mod tests {
     use super::*;
     use crate::identify::arm::Numbers;
-    use inference::estimate::Schedule;
-    use inference::estimate::fit;
+    use inference::estimate::{Schedule, fit};
     use inference::likelihood::Settings;
     use inference::likelihood::arm::ArmClips;
-    use inference::likelihood::setting::arm_numbers;
-    use inference::likelihood::setting::complete;
+    use inference::likelihood::setting::{arm_numbers, complete};
     use shared_mem::cell::Cell;
     use std::path::Path;
     use worlds::session::record;

@@ -2,8 +2,7 @@
 
 use crate::page::canvas::{Anchor, Canvas, WIDTH, width_of};
 use crate::page::scale::Scale;
-use crate::words::quantity::Unit;
-use crate::words::quantity::span;
+use crate::words::quantity::{Unit, span};
 use maud::Markup;
 use std::collections::BTreeMap;
 

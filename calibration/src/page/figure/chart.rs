@@ -2,8 +2,7 @@
 
 use crate::page::canvas::{Anchor, Canvas};
 use crate::page::scale::Scale;
-use crate::words::quantity::Unit;
-use crate::words::quantity::span;
+use crate::words::quantity::{Unit, span};
 use maud::Markup;
 
 /// Most points of a line: more than a screen shows only makes the page heavy.

@@ -2,8 +2,7 @@
 
 use crate::page::canvas::{Anchor, Canvas, WIDTH, width_of};
 use crate::page::scale::Scale;
-use crate::words::quantity::span;
-use crate::words::quantity::{Unit, short};
+use crate::words::quantity::{Unit, short, span};
 use maud::Markup;
 
 /// Parameters of one kind, which share an axis.

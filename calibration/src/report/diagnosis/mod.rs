@@ -167,9 +167,8 @@ fn clip_list(clips: &[String]) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::answer::Size;
-    use crate::answer::Trace;
     use crate::answer::diagnosis::{Candidate, Change, Clips, Gap, Nearest, Place, Remedy, Share, Status, Verdict};
+    use crate::answer::{Size, Trace};
     use shared_mem::recording::SessionFiles;
     use shared_mem::theta::Theta;
     use std::collections::BTreeMap;

@@ -1,7 +1,6 @@
 //! The whole way, on the simulated camera.
 
 use super::command::{Options, StartFrom, kinds, run};
-use super::depth;
 use super::fit::{Method, NoFit, fit};
 use super::frame::{Evidence, Frame};
 use super::grid::Grid;
@@ -9,7 +8,7 @@ use super::lens::Lens;
 use super::outline::Outliner;
 use super::search::Reach;
 use super::shape::Shape;
-use super::step;
+use super::{depth, step};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Camera, Cell};
 use shared_mem::frames::Pose;

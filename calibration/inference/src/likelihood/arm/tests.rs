@@ -339,18 +339,14 @@ fn peaks_are_what_the_controller_asks_of_a_loaded_arm_with_gravity() {
     let arm = ArmClips::moments(&cell, std::slice::from_ref(&recorded), |_: &[f64]| loaded()).expect("an arm");
     let peaks = arm.peaks(&[]).expect("it can be simulated");
     let model = arm.arm();
-    for joint in 0..DOF {
+    for (joint, peak) in peaks.iter().enumerate().take(DOF) {
         let logged = (80..600).map(|row| {
             let mut q = [0.0; MAX_JOINTS];
             q[..DOF].copy_from_slice(recorded.measured.q_row(row));
             (recorded.desired.tau[row * DOF + joint] + model.gravity(&q)[joint]).abs()
         });
         let largest = logged.fold(0.0, f64::max);
-        assert!(
-            (peaks[joint] - largest).abs() < 0.02 * largest.max(1.0),
-            "joint {joint}: {} of {largest}",
-            peaks[joint]
-        );
+        assert!((peak - largest).abs() < 0.02 * largest.max(1.0), "joint {joint}: {peak} of {largest}");
     }
 }
 
