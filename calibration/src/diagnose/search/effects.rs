@@ -1,7 +1,7 @@
 //! Which effects act together: effects are added while clips are predicted better with them, and dropped or swapped when they are
 //! not needed any more.
 //!
-//! Strokes that another program simulates are looked at around what each step extends ([`Anchored`]); what is extended, and what is found,
+//! Strokes that another program simulates are looked at around what each step extends (`Anchored`); what is extended, and what is found,
 //! is fitted to that program itself.
 
 use super::again::{by_engine, found_by_engine, reconsidered, rivals_refitted, without_the_best};
