@@ -19,8 +19,7 @@ picture in colour and one of depth, drawn now. Episodes that were no success are
 it is.
 
 Examples:
-  twin task twin/tasks/pick_carrot.toml --episodes 50 --noise 0.003 \\
-      --record carrot
+  twin task twin/tasks/pick_carrot.toml --episodes 50 --record carrot
   calibration export-episodes twin/tasks/pick_carrot.toml carrot --to lerobot --out carrot_lerobot
   calibration export-episodes twin/tasks/pick_carrot.toml carrot --to png --every 50 --out pictures
 
