@@ -98,12 +98,6 @@ impl CellRollout {
         }
     }
 
-    /// Gives the object, and nothing else, another state now: what a hit is known to have left behind. The contact so
-    /// far stays on record.
-    pub fn put_object(&mut self, object: &ObjectState) {
-        self.cell.move_object(&object.pose, object.velocity, object.angular_velocity);
-    }
-
     /// The whole state now. Allocates; [`CellRollout::checkpoint_into`] does not.
     pub fn checkpoint(&self) -> Checkpoint {
         Checkpoint { cell: self.cell.state(), camera: self.camera }
