@@ -8,6 +8,7 @@
 //! | [`engine`] | another program that simulates the arm |
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`likelihood`] | what the twin makes of recorded clips: residuals, and what varies from clip to clip |
+//! | [`object_fit`] | an object's parameters fitted to clips of rough hits |
 //! | [`interrupt`] | cancellation, pause and time budget |
 //! | [`kept`] | checkpoints of a computation |
 //! | [`seed`] | what is drawn is drawn from it |
@@ -42,6 +43,7 @@ pub mod estimate;
 
 pub mod kept;
 pub mod likelihood;
+pub mod object_fit;
 pub mod seed;
 pub mod statistics;
 

@@ -176,11 +176,7 @@ impl Labelled {
 }
 
 fn is_plain(of: &SensorGap) -> bool {
-    let from = match of.sensors {
-        Sensors::Joints => criteria::LARGE_JOINTS_EXCESS,
-        Sensors::Object => criteria::LARGE_OBJECT_EXCESS,
-    };
-    of.before - of.floor > from
+    of.before - of.floor > criteria::plain_excess(of.sensors == Sensors::Object)
 }
 
 fn has_a_gap(of: &SensorGap) -> bool {

@@ -10,7 +10,7 @@ use crate::diagnose::fit::sweep::Precision;
 use crate::diagnose::ground::Ground;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::library::Library;
-use crate::diagnose::search::baseline;
+use crate::diagnose::search::baseline::{self, Baseline};
 use crate::diagnose::{DiagnoseError, Diagnosis, Kind, Options, diagnose_clips, peaks};
 use inference::admit::{Admitted, Refused, Split};
 use inference::interrupt::Interrupt;
@@ -75,18 +75,13 @@ struct TrialContext<'a> {
 
 impl TrialContext<'_> {
     fn cases<E: Evidence>(&self, evidence: &E, found: &Diagnosis) -> Result<Vec<Case>, DiagnoseError> {
-        let bench = Bench {
-            evidence,
-            library: self.library,
-            scatter: evidence.scatter(),
-            interrupt: self.interrupt,
-            trail: (Kept::nothing(), ""),
-        };
+        let bench = Bench::new(evidence, self.library, self.interrupt, (Kept::nothing(), ""));
         let even = floor::sensors_alone(evidence);
-        let bar = Progress::new("baseline", baseline::steps(self.admitted));
+        let bar = Progress::new("baseline", baseline::steps(self.admitted.with_object));
         // The diagnosis' own: what its parameters make up for is no gap that anyone could explain.
-        let baseline = baseline::identify(&bench, &self.split, &self.world.cell, self.admitted, &bar);
-        let baseline = baseline.ok_or(DiagnoseError::NoBaseline)?;
+        let (split, cell, admitted) = (&self.split, &self.world.cell, self.admitted);
+        let baseline = Baseline { bench: &bench, split, cell, admitted };
+        let baseline = baseline.identified(&bar).ok_or(DiagnoseError::NoBaseline)?;
         let (detectability, oracle_shrink) = self.oracle(&bench, &baseline, &even);
         let case = |said| Case {
             world: self.world.number,
@@ -107,7 +102,7 @@ impl TrialContext<'_> {
         let effects: Vec<usize> = names.iter().filter_map(candidate).collect();
         let full = self.true_numbers(baseline);
         let judged = || {
-            let truth = bench.fit((&effects, full), &self.split.train, even, Some(baseline), EFFORT)?;
+            let truth = bench.fit(&effects, full, &self.split.train, even, Some(baseline), EFFORT)?;
             let deviance = |hypothesis: &Hypothesis| -> Option<f64> {
                 Some(bench.judge(hypothesis, &self.split.confirm, even)?.iter().map(FittedClip::deviance).sum())
             };

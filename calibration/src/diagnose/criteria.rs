@@ -110,12 +110,13 @@ pub const NAMED_IS_WRONG: Criterion = Criterion {
     value: 0.04,
 };
 
-/// More than this share of a gap is most of it.
+/// More than this share of a gap is most of it, and what comes to it of another does about as well (a choice).
 pub const MOST_OF_IT: f64 = 0.5;
-/// What comes to this share of another does about as well (a choice).
-pub const ALIKE_SHARE: f64 = 0.5;
 
-/// A gap of the joints is plain from here on [squared sigmas]: three times what a cause may leave of it.
-pub const LARGE_JOINTS_EXCESS: f64 = 3.0 * JOINTS_EXCESS_BESIDE_A_CAUSE.value;
-/// A gap of the object is plain from here on [squared sigmas]: three least ones.
-pub const LARGE_OBJECT_EXCESS: f64 = 3.0 * OBJECT_EXCESS.value;
+/// Excess from which on a gap is plain, over what a cause may leave of the joints', and over the least gap of an object (a choice).
+const PLAIN_EXCESS: f64 = 3.0;
+
+/// An excess is plain from here on [squared sigmas].
+pub fn plain_excess(of_object: bool) -> f64 {
+    PLAIN_EXCESS * if of_object { OBJECT_EXCESS.value } else { JOINTS_EXCESS_BESIDE_A_CAUSE.value }
+}

@@ -324,17 +324,17 @@ fn is_held(setting: &Setting) -> bool {
 /// A limit of its own for every joint: what it does depends on how hard the clips drive that joint, and above that it does
 /// nothing at all.
 fn biting(number: usize, peak: f64, unknown: &Unknown) -> Probe {
-    let moves = vec![(number, (PROBE_LIMIT_SHARE * peak).recip().min(unknown.upper))];
+    let moves = vec![(number, ((1.0 - PROBE_SHARE) * peak).recip().min(unknown.upper))];
     Probe { moves, one_sided: true, largest: MIN_LIMIT_SHARE.recip() }
 }
 
-/// The probe of a limit is one at this share of a joint's largest torque, its difference step is this share of it, and below
-/// this share of it no limit is looked for [1]: choices.
-const PROBE_LIMIT_SHARE: f64 = 0.9;
+/// The difference step of a limit is this share of a joint's largest torque, and below this share of it no limit is looked for [1]:
+/// choices.
 const LIMIT_STEP_SHARE: f64 = 0.01;
 const MIN_LIMIT_SHARE: f64 = 0.03;
 
-/// The step of a probe as a share of what is plausible [1]: small enough to be in proportion, large against noise.
+/// The step of a probe as a share of what is plausible, and what the probe of a limit cuts off of a joint's largest torque [1]: small
+/// enough to be in proportion, large against noise.
 const PROBE_SHARE: f64 = 0.1;
 
 /// What decides which probes of an effect make sense.

@@ -10,6 +10,7 @@
 //! |---|---|
 //! | [`criteria`] | the measured numbers that decide |
 //! | [`library`], [`ground`], `known_gains` | the candidates as numbers; where on the table objects slid; how far gains stated by value may be off |
+//! | `work` | how it is asked, why it fails, and the bench on which the clips lie |
 //! | [`fit`] | hypotheses linearised around clips and fitted to them |
 //! | [`select`] | extensions of a model taken on while clips that were not fitted are predicted better |
 //! | [`judge`] | how well a hypothesis predicts clips, how much of the gap it closes, how sure that is, and what is left |
@@ -35,86 +36,30 @@ pub mod select;
 mod test_bench;
 #[cfg(test)]
 mod test_likelihood;
+mod work;
 
 pub use crate::answer::diagnosis::{
     Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Remedy, Rest, SensorGap,
     Sensors, Share, StageTest, Status, TorqueRms, Verdict,
 };
 
+pub use work::{DiagnoseError, Options, peaks};
+
 use conclude::case::Case;
 use fit::bench::Bench;
-use ground::Ground;
-use inference::admit::{Admitted, Refused, admit, torques};
-use inference::controller::{self, ControllerError};
-use inference::engine::{Engine, EngineError, Quantity, Used};
+use inference::admit::{Admitted, Refused, Split, admit, torques};
+use inference::controller;
+use inference::engine::{Engine, Quantity, Used};
 use inference::interrupt::Interrupt;
-use inference::kept::{self, Fingerprint, Kept, Trail};
-use inference::likelihood::Evidence;
-use inference::likelihood::arm::ArmClips;
-use inference::likelihood::cell::CellClips;
-use inference::likelihood::object::ObjectClips;
-use inference::likelihood::setting::{self, BaseError};
-use library::Library;
-use shared_mem::cell::Cell;
+use inference::kept::{Fingerprint, Kept};
+use inference::likelihood::{Evidence, setting};
+use search::baseline::Baseline;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
-use shared_mem::typed;
-use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-use twin::arm::Joints;
-use twin::replay::ReplayError;
-use twin::sim::SimError;
-
-/// How a session is diagnosed.
-#[derive(Debug, Clone, Default)]
-pub struct Options {
-    /// Parameters that are known already; effects among them act in the baseline.
-    pub theta: Option<Theta>,
-    /// Draws the split and the bootstrap.
-    pub seed: u64,
-    /// Whether torques along the measured motion are explained, and not how commands are followed.
-    pub torques: bool,
-    /// Another program that simulates arm and object in place of the twin.
-    pub engine: Option<Arc<Engine>>,
-    /// After so long the best answer so far counts.
-    pub budget: Option<Duration>,
-    /// Where the answer will go: what was found so far is kept beside it; else in the session's folder.
-    pub out: Option<PathBuf>,
-    /// Where the page will go: commands that are advised write pages of other names.
-    pub report: Option<PathBuf>,
-}
-
-/// A session cannot be diagnosed.
-#[derive(Debug, thiserror::Error)]
-pub enum DiagnoseError {
-    /// The session cannot be used.
-    #[error(transparent)]
-    Refused(#[from] Refused),
-    /// The cell's parameters.
-    #[error(transparent)]
-    Base(#[from] BaseError),
-    #[error(transparent)]
-    Cell(#[from] SimError),
-    /// A replay at the end.
-    #[error(transparent)]
-    Replay(#[from] ReplayError),
-    /// The twin has no answer even where nothing is wrong.
-    #[error(
-        "the twin cannot follow the clips with the parameters of cell.toml; try `twin replay` and follow its advice"
-    )]
-    NoBaseline,
-    /// The law that leads the arm cannot be found.
-    #[error(transparent)]
-    Law(#[from] ControllerError),
-    /// The engine cannot be asked for these clips.
-    #[error(transparent)]
-    Engine(#[from] EngineError),
-    /// Ctrl-C. What was found is kept, and the words say where.
-    #[error("{0}")]
-    Interrupted(String),
-}
+use std::time::Instant;
+use work::{Question, Work, cut_short};
 
 /// Diagnoses a session; what was found on the way is kept until the answer is there.
 ///
@@ -150,14 +95,8 @@ pub fn diagnose_kept(
         .with_cell(&session.cell)
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
         .with_clips(&admitted.clips);
-    let kept = kept::for_work((options.out.as_deref(), &session.folder, "diagnose"), &question, interrupt);
-    let found = diagnosed(&session, &admitted, options, (interrupt, (&kept, "")));
-    interrupt.work_is_over();
-    // What work says that was cut short is no answer.
-    if interrupt.cancelled() {
-        return Err(DiagnoseError::Interrupted(kept.farewell(&typed::command())));
-    }
-    Ok((found?, kept))
+    let work = |work: Work<'_>| diagnosed(&session, &admitted, options, work);
+    work::kept("diagnose", (options, &session.folder), &question, interrupt, work)
 }
 
 /// The session whose arm goes where it was measured, where torques are asked about; else as it is.
@@ -184,11 +123,6 @@ fn prepared(session: &Session, options: &Options, interrupt: &Interrupt) -> Resu
     Ok((Session { cell, ..session.clone() }, admitted.in_parts()))
 }
 
-/// Of work of which nothing is kept.
-fn cut_short() -> DiagnoseError {
-    DiagnoseError::Interrupted("interrupted; start again".into())
-}
-
 /// Diagnoses clips that were admitted already; of the session only the cell and the name count.
 ///
 /// # Errors
@@ -199,8 +133,7 @@ pub fn diagnose_clips(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Diagnosis, DiagnoseError> {
-    let found = diagnosed(session, admitted, options, (interrupt, (Kept::nothing(), "")));
-    if interrupt.cancelled() { Err(cut_short()) } else { found }
+    work::passing(interrupt, |work| diagnosed(session, admitted, options, work))
 }
 
 /// Clips with what an engine reports, too.
@@ -228,80 +161,50 @@ fn diagnosed(
     work: Work<'_>,
 ) -> Result<Diagnosis, DiagnoseError> {
     let began = Instant::now();
-    let base = setting::complete(&session.cell, options.theta.as_ref())?;
-    let peaks = peaks(&session.cell, admitted, &base)?;
-    let library = Library::new(&session.cell, &base, Ground::crossed(admitted).as_ref(), &peaks);
-    let theta = |numbers: &[f64]| library.theta(numbers);
-    let nominal = setting::complete(&session.cell, None)?;
-    let engine = options.engine.as_ref();
-    let mut diagnosis = if admitted.with_object {
-        let robot = session.cell.robot.as_ref();
-        let arm = robot.map(|_| ArmClips::moments(&session.cell, &admitted.clips, theta)).transpose();
-        let arm = arm.map_err(Refused::from)?.map(|arm| arm.moved_by(options.engine.clone(), &nominal));
-        let object = ObjectClips::new(&session.cell, admitted.clips.clone(), library.settings.clone())?;
-        let evidence =
-            CellClips::new(arm, object.simulated_by(engine, &nominal), |numbers: &[f64]| library.felt_by_arm(numbers));
-        examine(&evidence, &library, session, admitted, options, work)?
-    } else {
-        let evidence = ArmClips::moments(&session.cell, &admitted.clips, theta).map_err(Refused::from)?;
-        let evidence = evidence.moved_by(options.engine.clone(), &nominal);
-        examine(&evidence, &library, session, admitted, options, work)?
-    };
+    let cause = Cause { session, admitted, split: admitted.split(options.seed), options };
+    let mut diagnosis = work::ask(&cause, &session.cell, admitted, options, work)?;
     if torques::is_tracking(&session.cell) {
         diagnosis.theta = torques::without_law(diagnosis.theta, options.theta.as_ref());
     }
-    diagnosis.engine = engine.map(|engine| engine.used());
+    diagnosis.engine = options.engine.as_ref().map(|engine| engine.used());
     diagnosis.warnings.extend(diagnosis.engine.iter().flat_map(Used::sentences));
     diagnosis.seconds = began.elapsed().as_secs_f64();
     Ok(diagnosis)
 }
 
-/// What cuts work short, and where its steps are kept.
-type Work<'a> = (&'a Interrupt, Trail<'a>);
-
-/// The largest torque that each joint is asked for in the clips where nothing is wrong [N m].
-///
-/// # Errors
-/// [`DiagnoseError`] when the arm cannot follow the clips; where there is none, nothing is asked for.
-pub fn peaks(cell: &Cell, admitted: &Admitted, base: &Theta) -> Result<Joints, DiagnoseError> {
-    if cell.robot.is_none() {
-        return Ok(Joints::default());
-    }
-    let arm = ArmClips::moments(cell, &admitted.clips, |_: &[f64]| base.clone()).map_err(Refused::from)?;
-    arm.peaks(&[]).map_err(|_| DiagnoseError::NoBaseline)
+/// What causes the gap of a session.
+struct Cause<'a> {
+    session: &'a Session,
+    admitted: &'a Admitted,
+    split: Split,
+    options: &'a Options,
 }
 
-fn examine<E: Evidence>(
-    evidence: &E,
-    library: &Library,
-    session: &Session,
-    admitted: &Admitted,
-    options: &Options,
-    (interrupt, trail): Work<'_>,
-) -> Result<Diagnosis, DiagnoseError> {
-    let bench = Bench { evidence, library, scatter: evidence.scatter(), interrupt, trail };
-    let split = admitted.split(options.seed);
-    let plan: &[_] = if admitted.with_object { &fit::stages::OBJECT } else { &fit::stages::ARM };
-    let bar = Progress::planned("diagnose", plan, search::baseline::steps(admitted));
-    let baseline =
-        search::baseline::identify(&bench, &split, &session.cell, admitted, &bar).ok_or(DiagnoseError::NoBaseline)?;
-    let refined = |full: &[f64]| {
-        let step = bench.step("refined").with_numbers(full);
-        trail.0.once(&step, || search::baseline::refined(&bench, &split, &session.cell, admitted, full))
-    };
-    let found = search::effects::search(&bench, &split, baseline, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?;
-    let cut_short = interrupt.spent();
-    bar.stage(fit::stages::CONCLUSION, 1);
-    let case = Case { bench: &bench, split: &split, found: &found, session, admitted, options };
-    let mut concluded = conclude::conclude(&case)?;
-    let baseline = library.theta(&found.steps[0].from.full);
-    // What the twin makes of the recorded motion says nothing about another program.
-    if options.engine.is_none() {
-        concluded.stage_test = judge::recorded_arm::stage_test(&session.cell, &baseline, admitted, &split.confirm)?;
+impl Question for Cause<'_> {
+    type Answer = Diagnosis;
+
+    fn examine<E: Evidence>(&self, bench: &Bench<'_, E>) -> Result<Diagnosis, DiagnoseError> {
+        let Self { session, admitted, split, options } = self;
+        let bar = Progress::planned(
+            "diagnose",
+            &fit::stages::plan(admitted.with_object),
+            search::baseline::steps(admitted.with_object),
+        );
+        let baseline = Baseline { bench, split, cell: &session.cell, admitted };
+        let found = baseline.identified(&bar).and_then(|begun| baseline.with_effects(begun, &bar));
+        let found = found.ok_or(DiagnoseError::NoBaseline)?;
+        let cut_short = bench.interrupt.spent();
+        bar.stage(fit::stages::CONCLUSION, 1);
+        let mut concluded = conclude::conclude(&Case { bench, split, found: &found, session, admitted, options })?;
+        // What the twin makes of the recorded motion says nothing about another program.
+        if options.engine.is_none() {
+            let baseline = bench.library.theta(&found.steps[0].from.full);
+            concluded.stage_test = judge::recorded_arm::stage_test(&session.cell, &baseline, admitted, &split.confirm)?;
+        }
+        if bench.interrupt.spent() {
+            concluded.budget_spent = true;
+            concluded.verdict = concluded.verdict.so_far(options.budget.unwrap_or_default(), cut_short);
+        }
+        Ok(concluded)
     }
-    if interrupt.spent() {
-        concluded.budget_spent = true;
-        concluded.verdict = concluded.verdict.so_far(options.budget.unwrap_or_default(), cut_short);
-    }
-    Ok(concluded)
 }

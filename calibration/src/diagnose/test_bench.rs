@@ -46,7 +46,7 @@ pub(super) fn truth(library: &Library, world: &World) -> Vec<f64> {
 
 /// A bench of any evidence; nothing of its work is kept.
 pub(super) fn bench<'a, E: Evidence>(evidence: &'a E, library: &'a Library, interrupt: &'a Interrupt) -> Bench<'a, E> {
-    Bench { evidence, library, scatter: evidence.scatter(), interrupt, trail: (Kept::nothing(), "") }
+    Bench::new(evidence, library, interrupt, (Kept::nothing(), ""))
 }
 
 /// Asks the bench on which the world's clips lie; residuals weigh what the sensors' noise alone makes of them.

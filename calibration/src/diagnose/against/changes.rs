@@ -1,16 +1,16 @@
 //! What changed as numbers: the value in each session, and the change with a 95 % interval.
 //!
-//! The interval is that of the difference of two numbers of one fit ([`Jackknife`]), so that what makes both uncertain alike does
-//! not count. Where a hit lies between a number and what is seen, the step over which its slope was taken comes on top.
+//! The interval is that of the difference of two numbers of one fit ([`Spread`]), so that what makes both uncertain alike does
+//! not count.
 
 use super::answer::Values;
 use super::fits::{Fitted, PairBench};
 use super::subjects::Subject;
 use super::turned::{Acts, Side, Turned};
+use crate::diagnose::fit::parameters::Spread;
 use crate::words::UNBOUNDED;
-use inference::estimate::interval::{Jackknife, LEVEL};
+use inference::estimate::interval::LEVEL;
 use inference::likelihood::Evidence;
-use inference::statistics::normal;
 use std::collections::BTreeMap;
 
 /// The parameters of a subject that each session has of its own.
@@ -20,9 +20,7 @@ pub(super) fn of_subject<E: Evidence>(
     subject: &Subject,
 ) -> BTreeMap<String, Values> {
     let library = pair_bench.bench.library;
-    let total = pair_bench.on_bench(&fitted.model, |bench| Some(bench.held(&fitted.hypothesis)));
-    let clips = || fitted.hypothesis.fitted.iter().map(|clip| &clip.reduced.form);
-    let jackknife = total.map(|total| Jackknife::new(&total, clips()));
+    let spread = pair_bench.on_bench(&fitted.model, |bench| Some(Spread::of(bench, &fitted.hypothesis)));
     let rough = subject.effect.is_some_and(|effect| !library.candidates[effect].is_of_arm());
     let mut all: BTreeMap<String, Values> = BTreeMap::new();
     for number in subject.numbers.clone() {
@@ -31,9 +29,9 @@ pub(super) fn of_subject<E: Evidence>(
             fitted.model.turned.iter().position(|turned| *turned == own)
         };
         let (Some(in_a), Some(in_b)) = (place(Side::A), place(Side::B)) else { continue };
-        let of_difference = |jackknife: &Jackknife| jackknife.half_width(&[(in_b, 1.0), (in_a, -1.0)], LEVEL);
-        let half = jackknife.as_ref().map_or(0.0, of_difference);
-        let half = if rough { half.hypot(normal(LEVEL) * library.unknowns[number].step) } else { half };
+        let rough_step = rough.then(|| library.unknowns[number].step);
+        let of_change = |spread: &Spread| spread.half_width(&[(in_b, 1.0), (in_a, -1.0)], rough_step, LEVEL);
+        let half = spread.as_ref().map_or(0.0, of_change);
         let setting = &library.settings.settings()[number];
         let [a, b] = [Side::A, Side::B].map(|side| fitted.model.of(side)[number]);
         let physical = |value: f64| setting.physical(value).clamp(-UNBOUNDED, UNBOUNDED);

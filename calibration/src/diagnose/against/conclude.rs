@@ -1,6 +1,5 @@
 //! From what the search found to the answer: the clips kept for confirming are opened here, and only here.
 
-use super::super::{DiagnoseError, Options};
 use super::answer::{Candidate, Comparison, Smallest, Verdict};
 use super::changes;
 use super::fits::{PairBench, numbers};
@@ -15,11 +14,13 @@ use crate::diagnose::conclude::advice;
 use crate::diagnose::conclude::site::{Advice, Site};
 use crate::diagnose::criteria::{CLASS_IS_RIGHT, UNKNOWN_IS_RIGHT};
 use crate::diagnose::fit::bench::Hypothesis;
-use crate::diagnose::judge::confidence::{MAX_PROBABILITY, TEMPERATURE_NATS};
+use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::localise;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes::Sizes;
+use crate::diagnose::select::gain::SAME_WORTH_NATS;
+use crate::diagnose::work::{DiagnoseError, Options};
 use inference::likelihood::{Evidence, Setting};
 use shared_mem::recording::Session;
 use std::collections::BTreeMap;
@@ -217,7 +218,7 @@ fn probabilities(steps: &[Step]) -> BTreeMap<usize, f64> {
     for step in steps {
         let proven: Vec<&Trial> = step.proven().collect();
         let best = proven.iter().map(|trial| trial.whole.nats).fold(0.0, f64::max);
-        let weight = |nats: f64| ((nats - best) / TEMPERATURE_NATS).exp();
+        let weight = |nats: f64| ((nats - best) / SAME_WORTH_NATS).exp();
         let total: f64 = proven.iter().map(|trial| weight(trial.whole.nats)).sum::<f64>() + weight(0.0);
         for trial in proven {
             let probability = MAX_PROBABILITY * weight(trial.whole.nats) / total;

@@ -44,7 +44,7 @@ impl<E: Evidence> PairBench<'_, E> {
     pub(super) fn fit(&self, model: Model, weights: &[f64], near: Option<&Fitted>, effort: Effort) -> Option<Fitted> {
         let (hypothesis, predicted) = self.on_bench(&model, |bench| {
             let near = near.map(|near| &near.hypothesis);
-            let hypothesis = bench.fit((&[], model.start()), &self.split.train, weights, near, effort)?;
+            let hypothesis = bench.fit(&[], model.start(), &self.split.train, weights, near, effort)?;
             let predicted = predict(bench, &hypothesis, &self.split.choose, weights)?;
             Some((hypothesis, predicted))
         })?;
@@ -65,8 +65,7 @@ impl<E: Evidence> PairBench<'_, E> {
         let library = model.library(self.bench.library);
         let evidence = TwoSessions { evidence: self.bench.evidence, first_of_b: self.first_of_b, model };
         let name = format!("two sessions: {:?}", model.turned);
-        let (scatter, trail) = (self.bench.scatter.clone(), (self.bench.trail.0, &name[..]));
-        ask(&Bench { evidence: &evidence, library: &library, scatter, interrupt: self.bench.interrupt, trail })
+        ask(&Bench::new(&evidence, &library, self.bench.interrupt, (self.bench.trail.0, &name)))
     }
 
     /// Numbers of B for clips of B that they were not fitted to.

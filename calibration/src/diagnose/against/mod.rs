@@ -32,27 +32,21 @@ mod turned;
 pub use answer::{Candidate, Comparison, Smallest, Values, Verdict};
 pub use pair::{Pair, Unlike};
 
-use super::library::Library;
-use super::{DiagnoseError, Options, Work, peaks};
+use super::work::{self, DiagnoseError, Options, Question, Work};
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::stages;
-use crate::diagnose::ground::Ground;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::remainder::Left;
-use crate::diagnose::search::{baseline, effects};
+use crate::diagnose::search::baseline::{self, Baseline};
 use fits::PairBench;
 use inference::admit::{COMMANDS_TO_CHOOSE_BY, Refused, Split, torques};
 use inference::interrupt::Interrupt;
-use inference::kept::{self, Fingerprint, Kept};
-use inference::likelihood::arm::ArmClips;
-use inference::likelihood::cell::CellClips;
-use inference::likelihood::object::ObjectClips;
-use inference::likelihood::{Evidence, setting};
+use inference::kept::{Fingerprint, Kept};
+use inference::likelihood::Evidence;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
-use shared_mem::typed;
 use std::sync::Arc;
 use std::time::Instant;
 use turned::{SIDES, Side, side_of};
@@ -92,13 +86,8 @@ pub fn compare_kept(
         .with_cell(&sessions[0].cell)
         .with_cell(&sessions[1].cell)
         .with_clips(&pair.admitted.clips);
-    let kept = kept::for_work((options.out.as_deref(), &sessions[1].folder, "against"), &question, interrupt);
-    let found = compared(sessions, &pair, options, (interrupt, (&kept, "")));
-    interrupt.work_is_over();
-    if interrupt.cancelled() {
-        return Err(DiagnoseError::Interrupted(kept.farewell(&typed::command())).into());
-    }
-    Ok((found?, kept))
+    let work = |work: Work<'_>| compared(sessions, &pair, options, work);
+    Ok(work::kept("against", (options, &sessions[1].folder), &question, interrupt, work)?)
 }
 
 /// The same of clips that were admitted already; of the sessions only cells and names count.
@@ -111,8 +100,7 @@ pub fn compare_clips(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Comparison, DiagnoseError> {
-    let found = compared(sessions, pair, options, (interrupt, (Kept::nothing(), "")));
-    if interrupt.cancelled() { Err(DiagnoseError::Interrupted("interrupted; start again".into())) } else { found }
+    work::passing(interrupt, |work| compared(sessions, pair, options, work))
 }
 
 fn compared(
@@ -121,26 +109,8 @@ fn compared(
     options: &Options,
     work: Work<'_>,
 ) -> Result<Comparison, DiagnoseError> {
-    let began = Instant::now();
-    let (cell, admitted) = (&sessions[0].cell, &pair.admitted);
-    let base = setting::complete(cell, options.theta.as_ref())?;
-    let peaks = peaks(cell, admitted, &base)?;
-    let library = Library::new(cell, &base, Ground::crossed(admitted).as_ref(), &peaks);
-    let theta = |numbers: &[f64]| library.theta(numbers);
-    let arm = cell.robot.as_ref().map(|_| ArmClips::moments(cell, &admitted.clips, theta)).transpose();
-    let mut comparison = match arm.map_err(Refused::from)? {
-        Some(arm) if !admitted.with_object => examine(&arm, &library, (sessions, pair), options, work)?,
-        arm => {
-            let object = ObjectClips::new(cell, admitted.clips.clone(), library.settings.clone())?;
-            examine(
-                &CellClips::new(arm, object, |numbers: &[f64]| library.felt_by_arm(numbers)),
-                &library,
-                (sessions, pair),
-                options,
-                work,
-            )?
-        }
-    };
+    let (began, cell) = (Instant::now(), &sessions[0].cell);
+    let mut comparison = work::ask(&Changed { sessions, pair, options }, cell, &pair.admitted, options, work)?;
     if torques::is_tracking(cell) {
         comparison.theta = torques::without_law(comparison.theta, options.theta.as_ref());
     }
@@ -148,36 +118,39 @@ fn compared(
     Ok(comparison)
 }
 
-fn examine<E: Evidence>(
-    evidence: &E,
-    library: &Library,
-    (sessions, pair): ([&Session; 2], &Pair),
-    options: &Options,
-    (interrupt, trail): Work<'_>,
-) -> Result<Comparison, DiagnoseError> {
-    let bench = Bench { evidence, library, scatter: evidence.scatter(), interrupt, trail };
-    let (admitted, cell) = (&pair.admitted, &sessions[0].cell);
-    let split = split_of(&admitted.groups, pair.first_of_b, options.seed);
-    let of_a = of_a(&split, pair.first_of_b);
-    let plan: &[_] = if admitted.with_object { &stages::OBJECT } else { &stages::ARM };
-    let plan = [plan, &search::STAGES].concat();
-    let bar = Progress::planned("diagnose", &plan, baseline::steps(admitted));
-    let begun = baseline::identify(&bench, &of_a, cell, admitted, &bar).ok_or(DiagnoseError::NoBaseline)?;
-    let refined = |full: &[f64]| {
-        let step = bench.step("refined of A").with_numbers(full);
-        trail.0.once(&step, || baseline::refined(&bench, &of_a, cell, admitted, full))
-    };
-    let on_a = if is_explained(&bench, &of_a, &begun) {
-        begun
-    } else {
-        effects::search(&bench, &of_a, begun, &refined, &bar).ok_or(DiagnoseError::NoBaseline)?.last
-    };
-    let pair_bench = PairBench { bench: &bench, first_of_b: pair.first_of_b, split: &split };
-    let subjects = subjects::all(library);
-    let found = search::search(&pair_bench, &subjects, &on_a, &bar).ok_or(DiagnoseError::NoBaseline)?;
-    bar.stage(stages::CONCLUSION, 1);
-    let case = conclude::Case { sessions, pair, of_a: &on_a, subjects: &subjects, found: &found };
-    conclude::conclude(&pair_bench, &case, options)
+/// What changed between two sessions.
+struct Changed<'a> {
+    sessions: [&'a Session; 2],
+    pair: &'a Pair,
+    options: &'a Options,
+}
+
+impl Question for Changed<'_> {
+    type Answer = Comparison;
+
+    fn examine<E: Evidence>(&self, bench: &Bench<'_, E>) -> Result<Comparison, DiagnoseError> {
+        let Self { sessions, pair, options } = self;
+        let (admitted, cell) = (&pair.admitted, &sessions[0].cell);
+        let split = split_of(&admitted.groups, pair.first_of_b, options.seed);
+        let of_a = of_a(&split, pair.first_of_b);
+        let (slopes, changes) = (stages::SLOPES, stages::CHANGES);
+        let further = stages::planned(&[slopes, changes, slopes, changes, stages::CONCLUSION]);
+        let plan = [stages::plan(admitted.with_object), further].concat();
+        let bar = Progress::planned("diagnose", &plan, baseline::steps(admitted.with_object));
+        let baseline = Baseline { bench, split: &of_a, cell, admitted };
+        let begun = baseline.identified(&bar).ok_or(DiagnoseError::NoBaseline)?;
+        let on_a = if is_explained(bench, &of_a, &begun) {
+            begun
+        } else {
+            baseline.with_effects(begun, &bar).ok_or(DiagnoseError::NoBaseline)?.last
+        };
+        let pair_bench = PairBench { bench, first_of_b: pair.first_of_b, split: &split };
+        let subjects = subjects::all(bench.library);
+        let found = search::search(&pair_bench, &subjects, &on_a, &bar).ok_or(DiagnoseError::NoBaseline)?;
+        bar.stage(stages::CONCLUSION, 1);
+        let case = conclude::Case { sessions: *sessions, pair, of_a: &on_a, subjects: &subjects, found: &found };
+        conclude::conclude(&pair_bench, &case, options)
+    }
 }
 
 /// Whether the parameters alone leave of A so little beyond the noise that an effect has nothing to explain.

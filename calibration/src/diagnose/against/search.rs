@@ -13,20 +13,12 @@ use crate::diagnose::select::forward::{Selection, backward, forward};
 use crate::diagnose::select::gain::Gain;
 use crate::diagnose::select::multi_start::{Fit, cheapest};
 use inference::likelihood::Evidence;
-use shared_mem::progress::{Planned, Progress};
+use shared_mem::progress::Progress;
 
 /// At most so many effects that both sessions have are found on the way.
 const MAX_SHARED_EFFECTS: usize = 2;
 /// An effect in both sessions that promises less than this is not fitted [deviance].
 const MIN_SHARED_GAIN: f64 = 6.0;
-
-/// The stages of the search, for the bar.
-const SLOPES: &str = "slopes of both sessions";
-/// See [`SLOPES`].
-const FITS: &str = "changes";
-/// With about how long each takes beside those of a diagnosis: a search that finds one change.
-pub(super) const STAGES: [Planned; 5] =
-    [(SLOPES, 1.0), (FITS, 2.0), (SLOPES, 1.0), (FITS, 1.0), (stages::CONCLUSION, 0.2)];
 
 /// A change that was fitted.
 #[derive(Debug, Clone)]
@@ -106,7 +98,7 @@ pub(super) fn search<E: Evidence>(
     bar: &Progress,
 ) -> Option<Found> {
     let start = Model::shared(of_a.full.clone(), &of_a.free);
-    bar.stage(SLOPES, 1);
+    bar.stage(stages::SLOPES, 1);
     let slopes = Slopes::around(pair_bench, &start, of_a, None)?;
     let around_a = slopes.scores(pair_bench.bench, &start, subjects);
     let changes = Changes { pair_bench, subjects, weights: slopes.weights, around_a, bar };
@@ -123,11 +115,13 @@ impl<E: Evidence> Selection for Changes<'_, E> {
 
     fn step(&self, now: &Extended, before: &[Step]) -> Option<(Step, Option<Extended>)> {
         let scores = if before.is_empty() { self.around_a.clone() } else { self.scores(&now.fitted)? };
-        let promising: Vec<&Score> = CHANGES.promising(&scores, |score| (score.p, score.gain)).collect();
-        self.bar.stage(FITS, promising.len() as u64);
+        let best = scores.iter().map(|score| score.gain).fold(0.0, f64::max);
+        let promising = scores.iter().filter(|score| CHANGES.promises(score.p, score.gain, best));
+        let promising: Vec<&Score> = promising.take(CHANGES.max_fitted).collect();
+        self.bar.stage(stages::CHANGES, promising.len() as u64);
         let (mut trials, mut shared) = (Vec::new(), Vec::new());
         for (done, score) in promising.into_iter().enumerate() {
-            self.bar.show(done as u64, &stages::of(FITS, &self.subjects[score.subject].name));
+            self.bar.show(done as u64, &stages::of(stages::CHANGES, &self.subjects[score.subject].name));
             if self.pair_bench.bench.interrupt.asked() {
                 return None;
             }
@@ -154,7 +148,7 @@ impl<E: Evidence> Changes<'_, E> {
 
     /// What the slopes around a model say.
     fn scores(&self, now: &Fitted) -> Option<Vec<Score>> {
-        self.bar.stage(SLOPES, 1);
+        self.bar.stage(stages::SLOPES, 1);
         let slopes = Slopes::around(self.pair_bench, &now.model, &now.hypothesis, Some(&self.weights))?;
         Some(slopes.scores(self.pair_bench.bench, &now.model, self.subjects))
     }

@@ -1,10 +1,10 @@
 //! A search that came to its end, and all that its answer is drawn from.
 
 use crate::answer::effect_in_words;
-use crate::diagnose::Options;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use crate::diagnose::judge::trial::{Found, Step};
+use crate::diagnose::work::Options;
 use inference::admit::{Admitted, Split};
 use inference::likelihood::Evidence;
 use shared_mem::recording::Session;

@@ -121,7 +121,7 @@ fn stands_in<E: Evidence>(case: &Case<'_, E>, step: &Step, effect: usize, rival:
     let mut full = last.full.clone();
     bench.library.candidates[effect].numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
     bench.library.candidates[rival].numbers.clone().for_each(|k| full[k] = fit.full[k]);
-    let swapped = bench.fit((&effects, full), &split.train, weights, Some(last), refit::last_pass(bench));
+    let swapped = bench.fit(&effects, full, &split.train, weights, Some(last), refit::last_pass(bench));
     let predicted = |hypothesis| predict(bench, hypothesis, &split.choose, weights);
     let Some((with, instead)) = predicted(last).zip(swapped.as_ref().and_then(predicted)) else { return true };
     with.over(&instead).may_be_none(1.0)

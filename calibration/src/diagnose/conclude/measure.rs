@@ -2,7 +2,6 @@
 
 use super::case::Case;
 use crate::answer::diagnosis::{Place, SensorGap};
-use crate::diagnose::DiagnoseError;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::confirm::{Confirmation, confirm};
 use crate::diagnose::judge::gap::Residuals;
@@ -10,6 +9,7 @@ use crate::diagnose::judge::held_out::{self, Fits};
 use crate::diagnose::judge::localise::localise;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes;
+use crate::diagnose::work::DiagnoseError;
 use inference::likelihood::Evidence;
 
 /// A hypothesis on the confirm clips.

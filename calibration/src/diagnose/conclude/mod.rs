@@ -28,7 +28,7 @@ pub mod written;
 
 pub use say::not_testable;
 
-use super::DiagnoseError;
+use super::work::DiagnoseError;
 use crate::answer::diagnosis::Diagnosis;
 use case::Case;
 use inference::likelihood::Evidence;

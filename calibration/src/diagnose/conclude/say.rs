@@ -15,7 +15,7 @@ use crate::diagnose::judge::partly::Partly;
 use crate::diagnose::judge::sizes::Sizes;
 use crate::diagnose::judge::unproven::{Unproven, unproven};
 use crate::diagnose::judge::{ends, held_out};
-use crate::diagnose::{DiagnoseError, Options};
+use crate::diagnose::work::{DiagnoseError, Options};
 use crate::words::{channel_in_words, words};
 use inference::admit::{Admitted, COMMANDS_TO_CHOOSE_BY, Split};
 use inference::likelihood::{Evidence, Group};

@@ -103,7 +103,7 @@ impl Finding<'_> {
     /// leaves nothing of it.
     fn moves_the_arm(&self) -> bool {
         let arm = self.left.iter().find(|left| !left.of_object);
-        self.of_arm && arm.is_some_and(|arm| arm.is_plain() && arm.explained() > 1.0 - arm.substitute)
+        self.of_arm && arm.is_some_and(|arm| arm.is_plain() && arm.explained() > 1.0 - arm.substitute())
     }
 
     /// How many times what noise alone leaves the residuals are without any effect.
@@ -166,17 +166,9 @@ impl Verdict {
 #[cfg(test)]
 pub(in crate::diagnose) mod tests {
     use super::*;
-    use crate::diagnose::criteria::{JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT};
 
     pub(in crate::diagnose) fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
-        let left = vec![Left {
-            before,
-            after,
-            floor: 1.0,
-            numerics: JOINTS_EXCESS_BESIDE_A_CAUSE.value,
-            substitute: JOINTS_SHARE_LEFT.value,
-            of_object: false,
-        }];
+        let left = vec![Left { before, after, floor: 1.0, of_object: false }];
         Finding {
             effects,
             rivals: Vec::new(),

@@ -41,15 +41,7 @@ impl<'a, E: Evidence> Anchored<'a, E> {
 
     /// A bench for these.
     pub(in crate::diagnose) fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
-        let (kept, label) = whole.trail;
-        let trail = (kept, self.around.as_ref().map_or(label, |around| &around.label));
-        Bench {
-            evidence: self,
-            library: whole.library,
-            scatter: whole.scatter.clone(),
-            interrupt: whole.interrupt,
-            trail,
-        }
+        whole.seen_as(self, self.around.as_ref().map_or(whole.trail.1, |around| &around.label))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by the steps of
 //! `descend`.
 
-use super::effort::Effort;
+use super::effort::{Effort, PROBE};
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
 use crate::diagnose::library::Library;
@@ -26,6 +26,20 @@ pub struct Bench<'a, E> {
     pub trail: Trail<'a>,
 }
 
+impl<'a, E: Likelihood> Bench<'a, E> {
+    pub fn new(evidence: &'a E, library: &'a Library, interrupt: &'a Interrupt, trail: Trail<'a>) -> Self {
+        Self { evidence, library, scatter: evidence.scatter(), interrupt, trail }
+    }
+
+    /// A bench of the same clips seen otherwise; `label` separates its kept work from this one's.
+    pub fn seen_as<'b, F: Likelihood>(&self, evidence: &'b F, label: &'b str) -> Bench<'b, F>
+    where
+        'a: 'b,
+    {
+        Bench::new(evidence, self.library, self.interrupt, (self.trail.0, label))
+    }
+}
+
 /// Clips, each with its nuisance parameters.
 pub(in crate::diagnose) type Clips = Vec<(usize, Vec<f64>)>;
 
@@ -45,6 +59,11 @@ pub struct FittedClip<V = WithOwn> {
 }
 
 impl<V> FittedClip<V> {
+    fn all(clips: Clips, forms: Vec<Reduced>) -> Vec<Self> {
+        let one = |((clip, own), reduced)| Self { clip, own, reduced, kind: PhantomData };
+        clips.into_iter().zip(forms).map(one).collect()
+    }
+
     /// `-2 ln` of its likelihood.
     pub fn deviance(&self) -> f64 {
         self.reduced.form[(0, 0)] + self.reduced.volume
@@ -134,7 +153,8 @@ impl<E: Likelihood> Bench<'_, E> {
     /// `None` when the twin has no answer at the start.
     pub fn fit(
         &self,
-        (effects, full): (&[usize], Vec<f64>),
+        effects: &[usize],
+        full: Vec<f64>,
         clips: &[usize],
         weights: &[f64],
         near: Option<&Hypothesis<E::Own>>,
@@ -145,7 +165,7 @@ impl<E: Likelihood> Bench<'_, E> {
         let from: Clips = clips.iter().map(own).collect();
         let step = self.step("fit").with(&(effects, clips, effort)).with_numbers(&full).with_numbers(weights);
         let step = step.with_numbers(from.iter().flat_map(|(_, own)| own));
-        self.trail.0.once(&step, || self.fitted((effects, full), from, weights, effort))
+        self.trail.0.once(&step, || self.fitted(effects, full, from, weights, effort))
     }
 
     /// A step of this bench by its name.
@@ -155,7 +175,8 @@ impl<E: Likelihood> Bench<'_, E> {
 
     fn fitted(
         &self,
-        (effects, full): (&[usize], Vec<f64>),
+        effects: &[usize],
+        full: Vec<f64>,
         from: Clips,
         weights: &[f64],
         effort: Effort,
@@ -166,33 +187,27 @@ impl<E: Likelihood> Bench<'_, E> {
         let clips = self.profiled(&full, from, weights)?;
         let clips = self.restarted(&full, clips, weights);
         let before_last = Effort { iterations: effort.iterations.saturating_sub(1), ..effort };
-        let (Reached { full, clips, .. }, last) = self.descended((full, clips), &moving, weights, before_last)?;
+        let (Reached { full, clips, .. }, last) = self.descended(full, clips, &moving, weights, before_last)?;
         let restarted = self.restarted(&full, clips.clone(), weights);
         let at = match last.filter(|_| moving.len() == free.len() && restarted == clips) {
             Some(at) => at,
             None => self.linearise(&full, &free, &restarted, effort.precision)?,
         };
         let forms = at.reduced(self.evidence, weights).ok()?;
-        let fitted = restarted.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip {
-            clip,
-            own,
-            reduced,
-            kind: PhantomData,
-        });
-        Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: fitted.collect() })
+        Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: FittedClip::all(restarted, forms) })
     }
 
     /// What the clips of a hypothesis cost at `full` after one step of some numbers alone, and the numbers then. `None` when the
     /// twin has no answer there.
     pub(in crate::diagnose) fn after_a_step(
         &self,
-        (from, full): (&Hypothesis<E::Own>, Vec<f64>),
+        from: &Hypothesis<E::Own>,
+        full: Vec<f64>,
         moving: &[usize],
         weights: &[f64],
     ) -> Option<(f64, Vec<f64>)> {
         let clips = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
-        let effort = Effort::of(1, Precision::Joints);
-        let (Reached { full, clips, .. }, _) = self.descended((full, clips), moving, weights, effort)?;
+        let (Reached { full, clips, .. }, _) = self.descended(full, clips, moving, weights, PROBE)?;
         Some((self.cost(&full, &clips, weights)?, full))
     }
 
@@ -211,20 +226,6 @@ impl<E: Likelihood> Bench<'_, E> {
     /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
     pub fn trying(&self, candidate: usize, effort: Effort) -> Effort {
         Effort { holds_joints: !self.library.candidates[candidate].is_of_arm(), ..effort }
-    }
-
-    /// Adds a candidate to a hypothesis and fits both from `full` on.
-    pub fn extend(
-        &self,
-        from: &Hypothesis<E::Own>,
-        (candidate, full): (usize, Vec<f64>),
-        clips: &[usize],
-        weights: &[f64],
-        effort: Effort,
-    ) -> Option<Hypothesis<E::Own>> {
-        let mut effects = from.effects.clone();
-        effects.push(candidate);
-        self.fit((&effects, full), clips, weights, Some(from), effort)
     }
 
     /// `full` with the candidate as strong as the score test says, within what is plausible.
@@ -280,13 +281,7 @@ impl<E: Likelihood> Bench<'_, E> {
         let at = self.restarted(&hypothesis.full, at, weights);
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
         let forms = swept.reduced(self.evidence, weights).ok()?;
-        let judged = at.into_iter().zip(forms).map(|((clip, own), reduced)| FittedClip {
-            clip,
-            own,
-            reduced,
-            kind: PhantomData,
-        });
-        Some(judged.collect())
+        Some(FittedClip::all(at, forms))
     }
 
     /// Clips with their nuisance parameters at their best for shared ones that are given.

@@ -30,7 +30,8 @@ impl<E: Likelihood> Bench<'_, E> {
     /// from it was worth it. `None` when the twin has no answer at the start.
     pub(super) fn descended(
         &self,
-        (full, clips): (Vec<f64>, Clips),
+        full: Vec<f64>,
+        clips: Clips,
         moving: &[usize],
         weights: &[f64],
         effort: Effort,
@@ -209,7 +210,7 @@ mod tests {
         let interrupt = Interrupt::default();
         let bench = bench(&bent, &library, &interrupt);
         let effort = Effort::of(25, Precision::Exact);
-        let fit = bench.fit((&[], library.start()), &[0], &[1.0], None, effort).expect("a fit");
+        let fit = bench.fit(&[], library.start(), &[0], &[1.0], None, effort).expect("a fit");
         for share in bent.shares(&fit.full) {
             assert!((share - SOUGHT).abs() < 1e-3, "{share}");
         }

@@ -29,5 +29,12 @@ pub(in crate::diagnose) const SCREENING: Effort = Effort::of(3, Precision::Joint
 pub(in crate::diagnose) const PROBE: Effort = Effort::of(1, Precision::Joints);
 /// A candidate that came near the best.
 pub(in crate::diagnose) const REFINEMENT: Effort = Effort::of(6, Precision::Joints);
+/// The baseline; and what is fitted without some clips, which begins where all of them together have it.
+pub(in crate::diagnose) const THOROUGH: Effort = Effort::of(8, Precision::Joints);
+/// The winner is fitted until it has converged, what is held of it with the others: its numbers are the answer. An arm alone
+/// converges well before so many linearisations.
+pub(in crate::diagnose) const LAST_PASS: Effort = Effort { frees_held: true, ..Effort::of(25, Precision::Exact) };
 /// Near is within this of the best deviance, or within a share of what the best gains (a choice).
 pub(in crate::diagnose) const NEAR_DEVIANCE: f64 = 40.0;
+/// A clip whose cost is off by more than this went another way than was thought [deviance] (a choice): no slope says what it costs.
+pub(in crate::diagnose) const ANOTHER_WAY_DEVIANCE: f64 = 100.0;

@@ -70,7 +70,7 @@ pub fn richest_residuals(
     let in_best = |column: &Column| match column {
         Column::Number(_) => true,
         Column::Probe(candidate, a, _) => {
-            scored.iter().any(|s| s.candidate == *candidate && s.alternative == *a && s.p < 0.2)
+            scored.iter().any(|s| s.candidate == *candidate && s.alternative == *a && s.p < shortlist::BY_CHANCE)
         }
     };
     let free: Vec<usize> = (0..swept.columns.len()).filter(|k| in_best(&swept.columns[*k])).map(|k| k + 1).collect();

@@ -1,6 +1,6 @@
 //! The numbers of an effect as a person reads them: in the effect's own units, each with a 90 % interval.
 //!
-//! An interval is that of [`Jackknife`]. Where a hit lies between a number and what is seen, the step over which its slope was
+//! An interval is that of [`Jackknife`], one number and the change of one alike. Where a hit lies between a number and what is seen, the step over which its slope was
 //! taken comes on top: the answer to less than that is rough. Of what was found on an arm alone the interval reaches to where the
 //! number would be without the twin's time step. Of a size on which nothing depends ([`super::undetermined`]), and of what was
 //! held and never fitted, all that is plausible is possible.
@@ -9,8 +9,8 @@ use super::bench::{Bench, Hypothesis};
 use crate::answer::Size;
 use crate::words::UNBOUNDED;
 use inference::estimate::interval::Jackknife;
-use inference::likelihood::Evidence;
 use inference::likelihood::setting::Setting;
+use inference::likelihood::{Evidence, Likelihood};
 use inference::statistics::normal;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};
@@ -30,9 +30,8 @@ pub fn of_effect_moved<E: Evidence>(
     effect: usize,
     time_step: &[f64],
 ) -> BTreeMap<String, Size> {
-    let half_widths = half_widths(bench, hypothesis);
+    let spread = Spread::of(bench, hypothesis);
     let candidate = &bench.library.candidates[effect];
-    let rough = !candidate.is_of_arm();
     let mut sizes = BTreeMap::new();
     for parameter in candidate.effect.parameters {
         let mut size = Size { values: Vec::new(), ci90: Vec::new(), unit: parameter.unit.to_owned() };
@@ -45,10 +44,9 @@ pub fn of_effect_moved<E: Evidence>(
             }
             let value = hypothesis.full[k];
             let place = hypothesis.free.iter().position(|free| *free == k);
-            let half = place.map_or(0.0, |place| half_widths[place]);
+            let rough_step = (!candidate.is_of_arm()).then(|| bench.library.unknowns[k].step);
+            let half = place.map_or(0.0, |place| spread.half_width(&[(place, 1.0)], rough_step, LEVEL));
             let moved = place.and_then(|place| time_step.get(place)).copied().unwrap_or(0.0);
-            let half =
-                if rough && half > 0.0 { half.hypot(normal(LEVEL) * bench.library.unknowns[k].step) } else { half };
             let unknown = candidate.sizes.contains(&k) || candidate.held.contains(&k);
             let open = unknown && !hypothesis.free.contains(&k);
             let interval = match bench.library.plausible(k).unwrap_or(parameter.plausible) {
@@ -78,9 +76,19 @@ fn readable(value: f64, [low, high]: [f64; 2], inverse: bool, possible: [f64; 2]
     (value, [low.max(possible[0]), high.min(possible[1])])
 }
 
-/// Half the interval of every free number.
-fn half_widths<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<f64> {
-    let clips = hypothesis.fitted.iter().map(|clip| &clip.reduced.form);
-    let jackknife = Jackknife::new(&bench.held(hypothesis), clips);
-    (0..hypothesis.free.len()).map(|k| jackknife.half_width(&[(k, 1.0)], LEVEL)).collect()
+/// How far the free numbers of a hypothesis may be off.
+pub(in crate::diagnose) struct Spread(Jackknife);
+
+impl Spread {
+    pub(in crate::diagnose) fn of<E: Likelihood>(bench: &Bench<'_, E>, hypothesis: &Hypothesis<E::Own>) -> Self {
+        let clips = hypothesis.fitted.iter().map(|clip| &clip.reduced.form);
+        Self(Jackknife::new(&bench.held(hypothesis), clips))
+    }
+
+    /// Half the interval, at `level`, of a sum of numbers, by their places among the free ones, each times a factor. `rough_step`: the
+    /// step of the slope, where a hit lies between the number and what is seen.
+    pub(in crate::diagnose) fn half_width(&self, sum: &[(usize, f64)], rough_step: Option<f64>, level: f64) -> f64 {
+        let half = self.0.half_width(sum, level);
+        if half > 0.0 { half.hypot(normal(level) * rough_step.unwrap_or(0.0)) } else { half }
+    }
 }

@@ -5,15 +5,15 @@
 //! some way along each of their nuisance parameters too.
 
 use super::bench::{Bench, Clips};
+use super::effort::ANOTHER_WAY_DEVIANCE;
 use super::sweep::Precision;
 use inference::likelihood::Likelihood;
 use inference::statistics::median;
 use nalgebra::DVector;
 
 /// A clip stands out that costs so many times the typical distance from the median more than the median does, and at least
-/// so much more.
+/// [`ANOTHER_WAY_DEVIANCE`] more.
 const OUTLIER_DISTANCE: f64 = 4.0;
-const MIN_EXCESS_COST: f64 = 100.0;
 /// Where along each of its nuisance parameters it is tried [sigma], and what share of that is then kept: the way back to the likeliest
 /// value may lead over the edge again.
 const RESTART_SIGMAS: [f64; 4] = [-5.0, -2.5, 2.5, 5.0];
@@ -68,7 +68,7 @@ impl<E: Likelihood> Bench<'_, E> {
 fn outstanding(costs: &[f64]) -> Vec<usize> {
     let Some(middle) = median(costs.iter().copied()) else { return Vec::new() };
     let typical = median(costs.iter().map(|cost| (cost - middle).abs())).unwrap_or(0.0);
-    let most = middle + MIN_EXCESS_COST.max(OUTLIER_DISTANCE * typical);
+    let most = middle + ANOTHER_WAY_DEVIANCE.max(OUTLIER_DISTANCE * typical);
     (0..costs.len()).filter(|place| costs[*place] > most).collect()
 }
 

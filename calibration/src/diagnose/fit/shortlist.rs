@@ -37,8 +37,8 @@ pub const TESTABLE: f64 = 3.0;
 /// A gain in deviance that noise alone reaches with this probability is chance.
 pub const BY_CHANCE: f64 = 0.2;
 
-/// So many forms next to the best are remembered.
-const FURTHER_FORMS: usize = 3;
+/// So many forms next to the best are remembered, and so many places on the table fitted to the end (a choice).
+pub(in crate::diagnose) const MAX_FORMS: usize = 3;
 
 /// Prior precision that keeps baseline numbers within their known ranges, added to a form's diagonal.
 pub fn hold_numbers(form: &mut DMatrix<f64>, columns: &[Column], library: &Library) {
@@ -87,7 +87,7 @@ pub fn score(swept: &Swept, sum: &DMatrix<f64>, library: &Library) -> Vec<Scored
         forms.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let mut forms = forms.into_iter();
         if let Some(best) = forms.next() {
-            let next = forms.take(FURTHER_FORMS).map(|form| (form.alternative, form.units)).collect();
+            let next = forms.take(MAX_FORMS).map(|form| (form.alternative, form.units)).collect();
             scored.push(Scored { next, ..best });
         }
     }

@@ -14,43 +14,40 @@ pub(in crate::diagnose) const FITS: &str = "fits";
 pub(in crate::diagnose) const LAST_FITS: &str = "final fits";
 /// The best is refined beside what was found before.
 pub(in crate::diagnose) const REFINEMENT: &str = "refinement";
+/// Two sessions are linearised around one model.
+pub(in crate::diagnose) const SLOPES: &str = "slopes of both sessions";
+/// Changes between them are fitted.
+pub(in crate::diagnose) const CHANGES: &str = "changes";
 /// The confirm clips are opened.
 pub(in crate::diagnose) const CONCLUSION: &str = "conclusion";
+
+/// About how long each takes beside the others.
+const DURATIONS: [Planned; 9] = [
+    (BASELINE, 1.0),
+    (SIGNATURES, 0.5),
+    (ARM_FITS, 0.5),
+    (FITS, 3.0),
+    (LAST_FITS, 1.0),
+    (REFINEMENT, 2.5),
+    (SLOPES, 1.0),
+    (CHANGES, 1.5),
+    (CONCLUSION, 0.2),
+];
 
 /// What the bar says while a candidate is looked at.
 pub(in crate::diagnose) fn of(stage: &str, candidate: &str) -> String {
     format!("{stage}: {}", candidate.replace('_', " "))
 }
 
+/// Stages, each with its duration.
+pub(in crate::diagnose) fn planned(stages: &[&str]) -> Vec<Planned> {
+    let duration = |stage: &&str| DURATIONS.into_iter().find(|(known, _)| known == stage);
+    stages.iter().filter_map(duration).collect()
+}
+
 /// A search that finds one effect, and then looks for another beside it.
-pub(in crate::diagnose) const ARM: [Planned; 9] = [
-    (BASELINE, 1.0),
-    (SIGNATURES, 1.0),
-    (FITS, 2.0),
-    (LAST_FITS, 1.0),
-    (REFINEMENT, 2.0),
-    (SIGNATURES, 1.0),
-    (FITS, 2.0),
-    (LAST_FITS, 1.0),
-    (CONCLUSION, 0.2),
-];
-
-/// The same with an object.
-pub(in crate::diagnose) const OBJECT: [Planned; 10] = [
-    (BASELINE, 1.0),
-    (SIGNATURES, 0.5),
-    (ARM_FITS, 0.5),
-    (FITS, 4.0),
-    (LAST_FITS, 1.0),
-    (REFINEMENT, 3.0),
-    (SIGNATURES, 0.5),
-    (FITS, 4.0),
-    (LAST_FITS, 1.0),
-    (CONCLUSION, 0.2),
-];
-
-/// Fits that the score test did not point to.
-pub(in crate::diagnose) const MORE_FITS: [Planned; 2] = [(FITS, 2.0), (LAST_FITS, 1.0)];
-
-/// A further step.
-pub(in crate::diagnose) const FURTHER: [Planned; 3] = [(SIGNATURES, 1.0), (FITS, 2.0), (LAST_FITS, 1.0)];
+pub(in crate::diagnose) fn plan(with_object: bool) -> Vec<Planned> {
+    let on_the_arm: &[&str] = if with_object { &[ARM_FITS] } else { &[] };
+    let first = [&[BASELINE, SIGNATURES], on_the_arm, &[FITS, LAST_FITS, REFINEMENT]].concat();
+    planned(&[&first[..], &[SIGNATURES, FITS, LAST_FITS, CONCLUSION]].concat())
+}

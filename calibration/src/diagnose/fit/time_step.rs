@@ -10,9 +10,6 @@ use super::sweep::Precision;
 use inference::likelihood::Evidence;
 use nalgebra::DVector;
 
-/// From the difference to half steps to the whole error of whole ones.
-const RICHARDSON_FACTOR: f64 = 4.0 / 3.0;
-
 /// How far each free number of a hypothesis would move; `None` where clips cannot be integrated in other steps, as those with an
 /// object. `weights`: those that it was fitted with.
 pub fn error<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
@@ -29,7 +26,7 @@ pub fn error<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights
         let weighed = rows
             .iter()
             .zip(halves.iter().zip(whole.iter()))
-            .map(|(row, (half, whole))| weights[row.channel].powi(2) * RICHARDSON_FACTOR * (half - whole));
+            .map(|(row, (half, whole))| weights[row.channel].powi(2) * (4.0 / 3.0) * (half - whole));
         slope += clip.matrix.columns(1, count).tr_mul(&DVector::from_iterator(rows.len(), weighed));
     }
     let information = bench.held(hypothesis).view((1, 1), (count, count)).into_owned();
@@ -56,7 +53,7 @@ mod tests {
         on_bench((&cell, &world), &library, |bench, even| {
             let effect = library.find("joint_stribeck_friction").expect("a candidate");
             let truth = truth(&library, &world);
-            let fit = bench.fit((&[effect], truth.clone()), &[0, 1], even, None, Effort::of(12, Precision::Exact));
+            let fit = bench.fit(&[effect], truth.clone(), &[0, 1], even, None, Effort::of(12, Precision::Exact));
             let fit = fit.expect("a fit");
             let moved = error(bench, &fit, even).expect("an arm alone");
             let (mut before, mut after) = (0.0_f64, 0.0_f64);

@@ -89,7 +89,7 @@ mod tests {
         full[offsets[0]] = 0.04;
         let kept = |world: &World, full: Vec<f64>| {
             on_bench((&cell, world), &library, |bench, even| {
-                without(bench, &bench.fit((&[effect], full), &[0, 1], even, None, ONCE).expect("a fit"))
+                without(bench, &bench.fit(&[effect], full, &[0, 1], even, None, ONCE).expect("a fit"))
             })
         };
         let off = kept(&world, full);

@@ -2,6 +2,7 @@
 
 use super::gap::{Residuals, Typical};
 use super::remainder::Left;
+use super::trial::MIN_SHARE_CLOSED;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use inference::admit::Split;
@@ -9,8 +10,6 @@ use inference::likelihood::{Evidence, Group};
 
 /// A gap smaller than this, over its floor, is taken for this size.
 const MIN_GAP_RATIO: f64 = 1.2;
-/// A gap widened by less than this share is chance.
-const MAX_SHARE_WIDENED: f64 = 0.1;
 
 /// How much of the way is gone between two hypotheses on all clips but those for confirming, of the group of sensors in which it is largest; 0
 /// where the gap widens on clips that were not fitted. `whole`: what the baseline leaves.
@@ -30,7 +29,7 @@ pub fn closes<E: Evidence>(
         Some(shares.chain(contact).collect())
     };
     let (Some(open), Some(choose)) = (on(&split.open()), on(split.elsewhere())) else { return 0.0 };
-    let harmless = |(_, choose): &(&f64, &f64)| **choose > -MAX_SHARE_WIDENED;
+    let harmless = |(_, choose): &(&f64, &f64)| **choose > -MIN_SHARE_CLOSED;
     open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
 }
 
@@ -43,7 +42,7 @@ fn way(before: f64, after: f64, floor: f64) -> f64 {
 /// share of the baseline's gap counts, where that is more.
 fn share(left: &Left, whole: f64) -> f64 {
     let way = way(left.before, left.after, left.floor);
-    let beyond_numerics = left.before - left.floor > left.numerics;
+    let beyond_numerics = left.before - left.floor > left.numerics();
     if way > 0.0 && beyond_numerics && !left.of_object {
         way.max((left.before - left.after) / (whole - left.floor))
     } else {
@@ -54,18 +53,10 @@ fn share(left: &Left, whole: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::criteria::{JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT};
 
     #[test]
     fn far_above_the_noise_the_plain_share_of_the_whole_gap_counts() {
-        let left = |before, after| Left {
-            before,
-            after,
-            floor: 1.0,
-            numerics: JOINTS_EXCESS_BESIDE_A_CAUSE.value,
-            substitute: JOINTS_SHARE_LEFT.value,
-            of_object: false,
-        };
+        let left = |before, after| Left { before, after, floor: 1.0, of_object: false };
         assert!((share(&left(1e5, 2e4), 1e5) - 0.8).abs() < 1e-3, "four fifths, and 14 % of the way");
         // A fifth of what a first effect left, itself a hundredth: of the whole next to nothing.
         assert!(share(&left(1e3, 8e2), 1e5) < 0.05);

@@ -1,13 +1,12 @@
 //! How sure a finding is: shares of the evidence among rivals, less what experience with simulated sessions takes off.
 
 use super::trial::{Step, Trial};
-use crate::diagnose::criteria::{ALIKE_SHARE, NAMED_IS_WRONG};
+use crate::diagnose::criteria::{MOST_OF_IT, NAMED_IS_WRONG};
 use crate::diagnose::library::Library;
+use crate::diagnose::select::gain::SAME_WORTH_NATS;
 
 /// The largest probability of a candidate: its limit, whatever the clips say.
 pub const MAX_PROBABILITY: f64 = 1.0 - NAMED_IS_WRONG.value;
-/// Nats count less than they say: twins are never exact. The temperature that made shares agree with frequencies.
-pub(in crate::diagnose) const TEMPERATURE_NATS: f64 = 4.0;
 
 /// Probability of every candidate tried in a step that could be the cause, and what is left for none of them.
 pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
@@ -16,7 +15,7 @@ pub fn probabilities(trials: &[Trial], none: bool) -> Vec<(usize, f64)> {
         .filter_map(|trial| Some((trial.scored.candidate, trial.gain()?.net(trial.scored.cost))))
         .collect();
     let best = fitted.iter().map(|(_, worth)| *worth).fold(0.0, f64::max);
-    let weight = |worth: f64| ((worth - best) / TEMPERATURE_NATS).exp();
+    let weight = |worth: f64| ((worth - best) / SAME_WORTH_NATS).exp();
     let nothing = if none { 1.0 / NAMED_IS_WRONG.value } else { weight(0.0) };
     let total: f64 = fitted.iter().map(|(_, worth)| weight(*worth)).sum::<f64>() + nothing;
     fitted.iter().map(|(candidate, worth)| (*candidate, MAX_PROBABILITY * weight(*worth) / total)).collect()
@@ -38,7 +37,7 @@ pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64
         let enough = match dearer {
             true => trial.closes_more_than(chosen_trial),
             false if library.look_alike(candidate, chosen) => trial.is_cause(),
-            false => trial.closes > ALIKE_SHARE * chosen_trial.closes,
+            false => trial.closes > MOST_OF_IT * chosen_trial.closes,
         };
         alike && enough && step.comes_as_near(trial, chosen_trial)
     };

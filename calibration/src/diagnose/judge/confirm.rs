@@ -9,9 +9,9 @@ use super::held_out::Fits;
 use super::remainder::{self, Left};
 use super::score::predict_unseen;
 use super::trial::MIN_SHARE_CLOSED;
-use crate::diagnose::DiagnoseError;
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::select::gain::Gain;
+use crate::diagnose::work::DiagnoseError;
 use inference::likelihood::{Evidence, Group};
 
 /// What they say.

@@ -242,7 +242,7 @@ mod tests {
         let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
         on_bench((&cell, &world), &library, |bench, even| {
             let [baseline, found] = [library.start(), truth(&library, &world)]
-                .map(|full| bench.fit((&[], full), &[0], even, None, ONCE).expect("a fit"));
+                .map(|full| bench.fit(&[], full, &[0], even, None, ONCE).expect("a fit"));
             let [before, after] =
                 [baseline, found].map(|fit| Residuals::at(bench, &fit, &[1]).expect("it can be simulated"));
             let shrink = after.shrink(&before, 1);

@@ -4,14 +4,10 @@
 use super::gap::Residuals;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::effort::Effort;
+use crate::diagnose::fit::effort::THOROUGH;
 use crate::diagnose::fit::left_out::numbers_without;
-use crate::diagnose::fit::sweep::Precision;
 use inference::admit::Split;
 use inference::likelihood::Evidence;
-
-/// Enough for a fit that begins where all clips together have it.
-const LEFT_OUT: Effort = Effort::of(8, Precision::Joints);
 
 /// A hypothesis for every clip that is judged: numbers, and clips that they were not fitted to.
 pub(in crate::diagnose) type Fits = Vec<(Hypothesis, Vec<usize>)>;
@@ -28,7 +24,7 @@ pub(in crate::diagnose) fn fits<E: Evidence>(
     let without = |out: &Vec<usize>| {
         let others: Vec<usize> = split.train.iter().copied().filter(|clip| !out.contains(clip)).collect();
         let full = hypothesis.full.clone();
-        Some((bench.fit((&hypothesis.effects, full), &others, weights, Some(hypothesis), LEFT_OUT)?, out.clone()))
+        Some((bench.fit(&hypothesis.effects, full, &others, weights, Some(hypothesis), THOROUGH)?, out.clone()))
     };
     split.in_turn.iter().map(without).collect()
 }
@@ -76,7 +72,7 @@ mod tests {
         on_bench((&cell, &world), &library, |bench, even| {
             let split = Split::new(&[vec![0], vec![1]], 0);
             assert_eq!(split.in_turn.len(), 2);
-            let all = bench.fit((&[], truth(&library, &world)), &split.train, even, None, ONCE).expect("a fit");
+            let all = bench.fit(&[], truth(&library, &world), &split.train, even, None, ONCE).expect("a fit");
             let fits = fits(bench, &split, (&all, even)).expect("two fits");
             for (fit, out) in &fits {
                 let seen: Vec<usize> = fit.fitted.iter().map(|clip| clip.clip).collect();

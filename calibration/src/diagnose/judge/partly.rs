@@ -160,7 +160,7 @@ mod tests {
             let with = truth(&library, &world);
             let mut without = with.clone();
             library.candidates[effect].numbers.clone().for_each(|k| without[k] = library.start()[k]);
-            let fit = |effects: &[usize], full| bench.fit((effects, full), &[0], even, None, ONCE).expect("a fit");
+            let fit = |effects: &[usize], full| bench.fit(effects, full, &[0], even, None, ONCE).expect("a fit");
             let (baseline, last) = (fit(&[], without), fit(&[effect], with));
             let split = Split { train: vec![0], confirm: vec![1], ..Split::default() };
             let before = Residuals::at(bench, &baseline, &split.confirm).expect("it can be simulated");

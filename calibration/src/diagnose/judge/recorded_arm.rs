@@ -2,8 +2,8 @@
 //! is gone then was the arm's; only what stays belongs to the hit, the slide and the camera.
 
 use crate::answer::diagnosis::StageTest;
-use crate::diagnose::DiagnoseError;
 use crate::diagnose::criteria::MOST_OF_IT;
+use crate::diagnose::work::DiagnoseError;
 use crate::words::in_unit;
 use inference::admit::{Admitted, torques};
 use shared_mem::cell::Cell;

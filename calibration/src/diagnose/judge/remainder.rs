@@ -7,8 +7,8 @@ use super::ends;
 use super::gap::Typical;
 use crate::answer::diagnosis::{SensorGap, Sensors};
 use crate::diagnose::criteria::{
-    DOUBTFUL, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, LARGE_JOINTS_EXCESS, LARGE_OBJECT_EXCESS,
-    MOST_OF_IT, OBJECT_EXCESS, OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, TURNS_WITHIN,
+    DOUBTFUL, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, MOST_OF_IT, OBJECT_EXCESS,
+    OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, TURNS_WITHIN, plain_excess,
 };
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
@@ -24,10 +24,6 @@ pub struct Left {
     pub after: f64,
     /// What noise alone would leave.
     pub floor: f64,
-    /// What other reasons than a cause leave beyond that.
-    pub numerics: f64,
-    /// Share of the gap that a cause may leave.
-    pub substitute: f64,
     /// Whether it is the object's.
     pub of_object: bool,
 }
@@ -39,12 +35,6 @@ impl Left {
             before: before.mean_square,
             after: after.mean_square,
             floor: before.floor,
-            numerics: if before.of_object {
-                OBJECT_EXCESS_BESIDE_A_CAUSE.value
-            } else {
-                JOINTS_EXCESS_BESIDE_A_CAUSE.value
-            },
-            substitute: if before.of_object { OBJECT_SHARE_LEFT.value } else { JOINTS_SHARE_LEFT.value },
             of_object: before.of_object,
         };
         before.iter().zip(after).map(one).collect()
@@ -60,6 +50,16 @@ impl Left {
         SensorGap { sensors, before: self.before, after: self.after, floor: self.floor }
     }
 
+    /// What other reasons than a cause leave beyond the noise.
+    pub fn numerics(&self) -> f64 {
+        if self.of_object { OBJECT_EXCESS_BESIDE_A_CAUSE.value } else { JOINTS_EXCESS_BESIDE_A_CAUSE.value }
+    }
+
+    /// Share of the gap that a cause may leave.
+    pub fn substitute(&self) -> f64 {
+        if self.of_object { OBJECT_SHARE_LEFT.value } else { JOINTS_SHARE_LEFT.value }
+    }
+
     /// The gap of the twin without any effect beyond the noise, in least gaps: of 1 on it is a gap.
     pub fn gaps(&self) -> f64 {
         (self.before - self.floor) / if self.of_object { OBJECT_EXCESS.value } else { JOINTS_EXCESS.value }
@@ -67,7 +67,7 @@ impl Left {
 
     /// Whether the gap of the twin without any effect is so large that a substitute for its cause does not close it.
     pub fn is_plain(&self) -> bool {
-        self.before - self.floor > if self.of_object { LARGE_OBJECT_EXCESS } else { LARGE_JOINTS_EXCESS }
+        self.before - self.floor > plain_excess(self.of_object)
     }
 
     /// How likely it is that nothing is there where no cause is seen.
@@ -80,8 +80,8 @@ impl Left {
     pub fn too_much(&self, clear: bool) -> bool {
         let excess = self.after - self.floor;
         // After a bouncing hit no two engines agree; what unknown causes are mistaken for leaves two thirds.
-        let substitute = if clear && self.of_object { MOST_OF_IT } else { self.substitute };
-        excess > self.numerics && excess > substitute * (self.before - self.floor)
+        let substitute = if clear && self.of_object { MOST_OF_IT } else { self.substitute() };
+        excess > self.numerics() && excess > substitute * (self.before - self.floor)
     }
 
     /// Share of the excess that is explained.
@@ -128,14 +128,7 @@ mod tests {
 
     #[test]
     fn a_gap_that_closes_to_a_hundredth_is_explained_and_one_that_halves_is_not() {
-        let left = |after| Left {
-            before: 1000.0,
-            after,
-            floor: 1.0,
-            numerics: JOINTS_EXCESS_BESIDE_A_CAUSE.value,
-            substitute: JOINTS_SHARE_LEFT.value,
-            of_object: false,
-        };
+        let left = |after| Left { before: 1000.0, after, floor: 1.0, of_object: false };
         assert!(!left(12.0).too_much(false));
         assert!(left(500.0).too_much(false));
         assert!((left(500.0).explained() - 0.5005).abs() < 1e-3);
@@ -143,31 +136,14 @@ mod tests {
 
     #[test]
     fn a_clear_cause_may_leave_a_rough_hit_rough_and_an_arm_nothing() {
-        let of_object = Left {
-            before: 60.0,
-            after: 24.0,
-            floor: 1.5,
-            numerics: OBJECT_EXCESS.value,
-            substitute: OBJECT_SHARE_LEFT.value,
-            of_object: true,
-        };
+        let of_object = Left { before: 60.0, after: 26.0, floor: 1.5, of_object: true };
         assert!(of_object.too_much(false) && !of_object.too_much(true));
         assert!(Left { after: 40.0, ..of_object }.too_much(true), "two thirds are left");
-        assert!(Left { of_object: false, substitute: JOINTS_SHARE_LEFT.value, ..of_object }.too_much(true));
+        assert!(Left { of_object: false, ..of_object }.too_much(true));
     }
 
     #[test]
     fn what_numerics_leave_is_no_remainder() {
-        assert!(
-            !Left {
-                before: 2.0,
-                after: 2.0,
-                floor: 1.0,
-                numerics: JOINTS_EXCESS_BESIDE_A_CAUSE.value,
-                substitute: JOINTS_SHARE_LEFT.value,
-                of_object: false
-            }
-            .too_much(false)
-        );
+        assert!(!Left { before: 2.0, after: 2.0, floor: 1.0, of_object: false }.too_much(false));
     }
 }

@@ -6,6 +6,7 @@
 
 use super::held_out::Fits;
 use crate::diagnose::fit::bench::{Bench, FittedClip, Hypothesis};
+use crate::diagnose::fit::effort::ANOTHER_WAY_DEVIANCE;
 use crate::diagnose::fit::left_out::shift_to;
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::gain::Gain;
@@ -19,9 +20,6 @@ pub struct Predicted {
     /// Clip and deviance, training clips first.
     pub clips: Vec<(usize, f64)>,
 }
-
-/// A linearisation is believed that the cost of a clip left out rises by no more than this [deviance].
-const MAX_LINEAR_RISE: f64 = 100.0;
 
 /// Predicts training and choosing clips.
 pub fn predict<E: Evidence>(
@@ -65,7 +63,7 @@ fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights:
         let form = &clip.reduced.form;
         let shift = shift_to(bench, hypothesis, &(&total - form));
         let linear = value(form, &all, &shift) + clip.reduced.volume;
-        let doubted = linear > clip.deviance() + MAX_LINEAR_RISE;
+        let doubted = linear > clip.deviance() + ANOTHER_WAY_DEVIANCE;
         let answer = if doubted { simulated(bench, hypothesis, (clip, &shift), weights) } else { None };
         (clip.clip, answer.unwrap_or(linear))
     };
@@ -113,7 +111,7 @@ mod tests {
         let cell = shipped();
         let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
         on_strokes((&cell, &world), |bench, even| {
-            let mut fit = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let mut fit = bench.fit(&[], bench.library.start(), &[0, 1], even, None, ONCE).expect("a fit");
             let left_out = |fit: &Hypothesis| predict(bench, fit, &[], even).expect("strokes").clips[0].1;
             let nearly_straight = left_out(&fit);
             // As if the first clip lay on an edge: at the point everything is steep, and a step away nothing is.

@@ -5,7 +5,7 @@ use super::held_out::Fits;
 use super::remainder;
 use super::tolerance::{self, Measured};
 use crate::answer::diagnosis::{Change, Gap, SensorGap, TorqueRms};
-use crate::diagnose::DiagnoseError;
+use crate::diagnose::work::DiagnoseError;
 
 use crate::diagnose::fit::bench::Bench;
 use crate::words::in_unit;

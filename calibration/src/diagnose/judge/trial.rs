@@ -3,7 +3,7 @@
 use super::closing::closes;
 use super::gap::{Residuals, Typical};
 use super::score::{Predicted, predict};
-use crate::diagnose::criteria::{ALIKE_SHARE, MOST_OF_IT, OBJECT_EXCESS};
+use crate::diagnose::criteria::{MOST_OF_IT, OBJECT_EXCESS};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::floor;
 use crate::diagnose::fit::shortlist::Scored;
@@ -15,7 +15,8 @@ use inference::likelihood::Evidence;
 
 /// An effect on the arm must be worth more than this for each of its residuals [nats]: there are so many that the least numerics add up.
 pub(in crate::diagnose) const MIN_NATS_PER_ROW: f64 = 0.0025;
-/// A cause closes more than this share of the gap: what helps only beside nuisance parameters of clips is none.
+/// A cause closes more than this share of the gap: what helps only beside nuisance parameters of clips is none. A gap that widens by less
+/// does so by chance, and what leaves more of what the best gains on the arm is not what acts there (a choice).
 pub const MIN_SHARE_CLOSED: f64 = 0.1;
 /// Of one that closes so much of the gap, and predicts nearly all clips better, one that it predicts worse does not matter.
 pub(in crate::diagnose) const LARGE_SHARE_CLOSED: f64 = 0.3;
@@ -221,7 +222,7 @@ impl Step {
     pub(in crate::diagnose) fn comes_as_near(&self, trial: &Trial, other: &Trial) -> bool {
         let without = self.from.deviance();
         let way = |trial: &Trial| trial.fitted.as_ref().map_or(0.0, |(fit, _)| (without / fit.deviance()).ln());
-        trial.own_numbers || way(trial) > ALIKE_SHARE * way(other)
+        trial.own_numbers || way(trial) > MOST_OF_IT * way(other)
     }
 
     /// Whether no other effect that could be the cause is worth half as much, but for those that are known to look alike:
@@ -229,6 +230,6 @@ impl Step {
     fn is_alone(&self, library: &Library, candidate: usize) -> bool {
         let worth = |trial: &Trial| trial.gain().map(|gain| gain.net(trial.scored.cost));
         let next = self.causes_unlike(library, candidate).filter_map(worth).fold(0.0, f64::max);
-        self.trial(candidate).and_then(worth).is_some_and(|own| next < ALIKE_SHARE * own)
+        self.trial(candidate).and_then(worth).is_some_and(|own| next < MOST_OF_IT * own)
     }
 }

@@ -242,8 +242,8 @@ mod tests {
         let library = Library::new(&cell, &base, None, &[10.0; MAX_JOINTS]);
         let candidate = &library.candidates[library.find(candidate).expect("a candidate")];
         on_bench((&cell, &world), &library, |bench, even| {
-            let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-            start(&super::super::around(bench, (&baseline, even)), candidate).map(|full| library.theta(&full))
+            let baseline = bench.fit(&[], library.start(), &[0, 1], even, None, ONCE).expect("a fit");
+            start(&super::super::around(bench, &baseline, even), candidate).map(|full| library.theta(&full))
         })
     }
 

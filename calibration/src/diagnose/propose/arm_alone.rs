@@ -7,15 +7,12 @@ use super::{Around, Search, starts};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, PROBE, REFINEMENT, SCREENING};
 use crate::diagnose::fit::{stages, undetermined};
-use crate::diagnose::judge::trial::Step;
+use crate::diagnose::judge::trial::{MIN_SHARE_CLOSED, Step};
 use crate::diagnose::select::multi_start::MultiStart;
 use inference::estimate::{ClipModel, Impossible};
 use inference::likelihood::arm::following::Moment;
 use inference::likelihood::random_effects::{RandomEffects, WithoutOwn};
 use inference::likelihood::{Channel, Evidence, Likelihood, Near, Reach, Row};
-
-/// What leaves more of the gain of the best on the arm's own channels than this share is not what acts there (a choice).
-const NEAR_ON_ARM_SHARE: f64 = 0.1;
 
 /// The same clips, rows and channels; residuals of the object are zero, and clips have no nuisance parameters.
 pub struct ArmAlone<'a, E>(pub &'a E);
@@ -23,9 +20,7 @@ pub struct ArmAlone<'a, E>(pub &'a E);
 impl<E: Evidence> ArmAlone<'_, E> {
     /// A bench for these.
     pub fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
-        let (evidence, scatter) = (self, RandomEffects::default());
-        let trail = (whole.trail.0, "the arm alone");
-        Bench { evidence, library: whole.library, scatter, interrupt: whole.interrupt, trail }
+        whole.seen_as(self, "the arm alone")
     }
 }
 
@@ -58,12 +53,11 @@ pub(in crate::diagnose) fn fitted<E: Evidence>(
         let scored = (!bench.interrupt.asked()).then(|| &step.trials[*place].scored)?;
         let effects = [&step.from.effects[..], &[scored.candidate]].concat();
         let fits = MultiStart { bench: &arm, effects: &effects, clips, weights, near: None };
-        let best = fits.best(starts::kept(&around, scored, overlooked), SCREENING)?;
-        Some((*place, fits.fit(best.full, REFINEMENT)?))
+        Some((*place, fits.best_further(starts::kept(&around, scored, overlooked), SCREENING, 1, REFINEMENT)?))
     };
     let all: Vec<(usize, Hypothesis<WithoutOwn>)> = places.iter().enumerate().filter_map(alone).collect();
     let best = all.iter().fold(&from, |best, (_, fit)| if fit.deviance() < best.deviance() { fit } else { best });
-    let near = best.deviance() + NEAR_DEVIANCE.max(NEAR_ON_ARM_SHARE * (from.deviance() - best.deviance()));
+    let near = best.deviance() + NEAR_DEVIANCE.max(MIN_SHARE_CLOSED * (from.deviance() - best.deviance()));
     let anew = if arm_gap_is_open(&step.whole, &step.left) { (search.refined)(&best.full) } else { None };
     let near: Vec<(usize, Hypothesis<WithoutOwn>)> =
         all.into_iter().filter(|(_, alone)| alone.deviance() < near).collect();
@@ -179,7 +173,7 @@ mod tests {
             own_numbers: true,
         };
         let step = Step {
-            from: bench.fit((&[], full), &[0, 1], even, None, PROBE).expect("a fit"),
+            from: bench.fit(&[], full, &[0, 1], even, None, PROBE).expect("a fit"),
             predicted: Predicted { clips: Vec::new() },
             trials: asked.iter().map(trial).collect(),
             weights: even.to_vec(),
@@ -280,10 +274,10 @@ mod tests {
             };
             let (gains, of_object): (Vec<usize>, Vec<usize>) =
                 library.baseline.clone().partition(|k| library.joints[*k].is_some());
-            let fit = alone.bench(whole).fit((&[], library.start()), &[0, 1], even, None, step).expect("a fit");
+            let fit = alone.bench(whole).fit(&[], library.start(), &[0, 1], even, None, step).expect("a fit");
             assert_eq!(moved(fit.full), gains, "joints' channels tell the gains, and nothing of the object");
             let effort = Effort { holds_joints: true, ..step };
-            let fit = whole.fit((&[], library.start()), &[0, 1], even, None, effort).expect("a fit");
+            let fit = whole.fit(&[], library.start(), &[0, 1], even, None, effort).expect("a fit");
             let moved = moved(fit.full);
             assert!(!moved.is_empty() && moved.iter().all(|k| of_object.contains(k)), "{moved:?} of {of_object:?}");
         });

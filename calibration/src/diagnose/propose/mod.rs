@@ -15,6 +15,7 @@ pub mod signatures;
 pub mod starts;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
 use crate::diagnose::select::multi_start::MultiStart;
@@ -43,6 +44,14 @@ impl<'a, E> Search<'a, E> {
         E: Evidence,
     {
         MultiStart { bench: self.bench, effects, clips: &self.split.train, weights, near: Some(near) }
+    }
+
+    /// A fit gone on with.
+    pub(in crate::diagnose) fn onwards(&self, fit: &Hypothesis, weights: &[f64], effort: Effort) -> Option<Hypothesis>
+    where
+        E: Evidence,
+    {
+        self.bench.fit(&fit.effects, fit.full.clone(), &self.split.train, weights, Some(fit), effort)
     }
 
     /// The same on another bench of the same clips.
@@ -101,7 +110,8 @@ impl<E: Likelihood> Around<'_, E> {
 #[cfg(test)]
 fn around<'a, E: Likelihood>(
     bench: &'a Bench<'a, E>,
-    (from, weights): (&'a Hypothesis<E::Own>, &'a [f64]),
+    from: &'a Hypothesis<E::Own>,
+    weights: &'a [f64],
 ) -> Around<'a, E> {
     Around { bench, from, weights }
 }

@@ -115,8 +115,8 @@ mod tests {
         let library = Library::new(&cell, &base, None, &[87.0; 8]);
         let candidate = library.find("torque_ripple").expect("a candidate");
         let begun = on_bench((&cell, &world), &library, |bench, even| {
-            let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-            start(&super::super::around(bench, (&baseline, even)), candidate).expect("numbers")
+            let baseline = bench.fit(&[], library.start(), &[0, 1], even, None, ONCE).expect("a fit");
+            start(&super::super::around(bench, &baseline, even), candidate).expect("numbers")
         });
         let orders = library.candidates[candidate].alternatives[0].form.iter().map(|(k, _)| begun[*k]);
         for (joint, (found, order)) in orders.zip(order).enumerate() {

@@ -1,6 +1,6 @@
 //! Which candidates are worth a fit.
 
-use crate::diagnose::criteria::{ALIKE_SHARE, OBJECT_EXCESS};
+use crate::diagnose::criteria::{MOST_OF_IT, OBJECT_EXCESS};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
 use crate::diagnose::judge::gap::Typical;
@@ -12,9 +12,9 @@ use twin::effects::Stage;
 
 /// An arm whose gap is smaller than this in squared sigmas is not the cause of what an object does.
 const QUIET_ARM_EXCESS: f64 = 0.5;
-/// So many candidates are fitted beside them because they stand out at the least scatter: those whose signature explains
-/// this share of what the best one does there.
-const MAX_STANDING_OUT: usize = 2;
+/// So many candidates are fitted besides because they stand out at the least scatter, and so many trials of a step once more with the
+/// object found anew under them (a choice).
+pub(in crate::diagnose) const MAX_FURTHER: usize = 2;
 /// An object's gap beyond this, half of what two engines differ by, has all effects on the slide fitted: which of them it is
 /// shows in how far fits get.
 const SLIDE_EXCESS: f64 = 0.5 * OBJECT_EXCESS.value;
@@ -27,7 +27,8 @@ pub(in crate::diagnose) fn to_fit<E: Evidence>(
     bench: &Bench<'_, E>,
     from: &Hypothesis,
     scored: &[Scored],
-    (whole, left): (&[Typical], &[Typical]),
+    whole: &[Typical],
+    left: &[Typical],
 ) -> Vec<usize> {
     let effect = |s: &Scored| bench.library.candidates[s.candidate].effect;
     let mut all = Vec::new();
@@ -46,13 +47,13 @@ pub(in crate::diagnose) fn to_fit<E: Evidence>(
         let Some(best) = group.first() else { continue };
         let likely = |s: &&&Scored| {
             let visible = !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s));
-            EFFECTS.promises((s.p, s.gain), best.gain) && visible
+            EFFECTS.promises(s.p, s.gain, best.gain) && visible
         };
         let partners = effect(best).confusable_with;
         let first = group.iter().filter(likely).take(EFFECTS.max_fitted);
         let confusable = group
             .iter()
-            .filter(|s| partners.contains(&effect(s).name) && EFFECTS.promises((s.p, s.gain), 0.5 * best.gain));
+            .filter(|s| partners.contains(&effect(s).name) && EFFECTS.promises(s.p, s.gain, 0.5 * best.gain));
         all.extend(first.chain(confusable).map(|s| s.candidate));
     }
     let more = |wanted: &dyn Fn(&Scored) -> bool| -> Vec<usize> {
@@ -87,10 +88,10 @@ pub(in crate::diagnose) fn seen_at_the_least_scatter<'a, E: Evidence>(
     let Some(best) = object.first() else { return Vec::new() };
     let likely = |s: &&&Scored| {
         s.p < 0.01
-            && s.gain > ALIKE_SHARE * best.gain
+            && s.gain > MOST_OF_IT * best.gain
             && !bench.negligible(s.candidate, &bench.begun(from.full.clone(), s))
     };
-    object.iter().filter(likely).take(MAX_STANDING_OUT).copied().collect()
+    object.iter().filter(likely).take(MAX_FURTHER).copied().collect()
 }
 
 /// Candidates on the arm that the score test passed over although a gap remains there that none of the others explains:
@@ -117,13 +118,13 @@ mod tests {
         let cell = shipped();
         let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
         on_strokes((&cell, &world), |bench, even| {
-            let from = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let from = bench.fit(&[], bench.library.start(), &[0, 1], even, None, ONCE).expect("a fit");
             let scored = |candidate| Scored { signal: 2.0 * TESTABLE, ..nothing_said_of(bench.library, candidate) };
             let all: Vec<Scored> = (0..bench.library.candidates.len()).map(scored).collect();
             let fitted = |mean_square: f64| {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
                 let left = [group(false, 1.5), group(true, mean_square)];
-                to_fit(bench, &from, &all, (&left, &left))
+                to_fit(bench, &from, &all, &left, &left)
             };
             let slides = bench.library.candidates.iter().filter(|c| c.effect.stage == Stage::Slide).count();
             assert_eq!(fitted(1.5 + 0.9 * SLIDE_EXCESS).len(), 0);
@@ -143,7 +144,7 @@ mod tests {
         let cell = shipped();
         let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
         on_strokes((&cell, &world), |bench, even| {
-            let from = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let from = bench.fit(&[], bench.library.start(), &[0, 1], even, None, ONCE).expect("a fit");
             // All of them stand out alike by the score test.
             let scored = |candidate: usize| {
                 let probe = &bench.library.candidates[candidate].alternatives[0].probes[0];
@@ -156,7 +157,7 @@ mod tests {
             let fitted = |arm: f64| -> Vec<Stage> {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
                 let left = [group(false, arm), group(true, 100.0)];
-                let fitted = to_fit(bench, &from, &all, (&left, &left));
+                let fitted = to_fit(bench, &from, &all, &left, &left);
                 fitted.into_iter().map(|c| bench.library.candidates[c].effect.stage).collect()
             };
             assert!(fitted(3.0).contains(&Stage::Slide));

@@ -3,7 +3,7 @@
 //! joint by joint. All of these are starts of one fit ([`crate::diagnose::select::multi_start`]).
 
 use super::{Around, along_motion, ripple};
-use crate::diagnose::fit::shortlist::Scored;
+use crate::diagnose::fit::shortlist::{MAX_FORMS, Scored};
 use crate::diagnose::library::Candidate;
 use inference::likelihood::{Likelihood, Setting};
 use twin::effects::{Search, Stage};
@@ -18,8 +18,6 @@ const WITHOUT_A_SLOPE: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
 const IN_EACH_JOINT: [f64; 4] = [0.1, 0.3, 1.0, 3.0];
 /// Friction beside a patch as a share of what it is without one: what was fitted is a mean of both.
 const FRICTION_BESIDE: [f64; 3] = [0.9, 1.0, 1.1];
-/// So many of the places where the clips cost least are fitted, each to the end (a choice).
-pub(in crate::diagnose) const MAX_PLACES: usize = 3;
 
 /// A start that costs more than this many times what the hypothesis without the candidate does is far from anything that
 /// acts: an effect whose strength is right spares something, though the other numbers still stand in for it.
@@ -76,7 +74,7 @@ fn pointed_at<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64
 
 /// Whether a candidate's forms are places on the table.
 pub(in crate::diagnose) fn has_places(candidate: &Candidate) -> bool {
-    candidate.alternatives.len() > MAX_PLACES && candidate.effect.stage == Stage::Slide
+    candidate.alternatives.len() > MAX_FORMS && candidate.effect.stage == Stage::Slide
 }
 
 /// Where the clips cost least with a candidate in each of its many forms, friction being another beside it: an edge that lies
@@ -93,11 +91,11 @@ fn placed<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64>> {
             })
         });
         // A place that costs more than those that are fitted anyway is not fitted.
-        let bound = places.get(MAX_PLACES - 1).map_or(f64::INFINITY, |(cost, _)| *cost);
+        let bound = places.get(MAX_FORMS - 1).map_or(f64::INFINITY, |(cost, _)| *cost);
         places.extend(at.cheapest(numbers, bound));
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
-    places.into_iter().take(MAX_PLACES).map(|(_, full)| full).collect()
+    places.into_iter().take(MAX_FORMS).map(|(_, full)| full).collect()
 }
 
 /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least, in any form, unless
@@ -150,7 +148,7 @@ fn joint_by_joint<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate) -> V
         let beside = library.baseline.clone().filter(|k| library.joints[*k] == library.joints[one.0]);
         let chosen: Vec<usize> = beside.chain([one.0]).collect();
         let tried = IN_EACH_JOINT.iter().filter_map(|share| {
-            at.bench.after_a_step((at.from, at.moved(&full, one, share * probe.largest)), &chosen, at.weights)
+            at.bench.after_a_step(at.from, at.moved(&full, one, share * probe.largest), &chosen, at.weights)
         });
         let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
         let now = at.cost(&full);
@@ -255,8 +253,8 @@ mod tests {
         let library = Library::new(&cell, &base, None, &peaks);
         let candidate = library.find("torque_saturation").expect("a candidate");
         let begun = on_bench((&cell, &world), &library, |bench, even| {
-            let baseline = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
-            limits(&around(bench, (&baseline, even)), &library.candidates[candidate], library.start())
+            let baseline = bench.fit(&[], library.start(), &[0, 1], even, None, ONCE).expect("a fit");
+            limits(&around(bench, &baseline, even), &library.candidates[candidate], library.start())
         });
         for ((size, share), peak) in library.candidates[candidate].sizes.iter().zip(shares).zip(peaks) {
             let found = (begun[*size] * peak).recip();
@@ -277,10 +275,10 @@ mod tests {
         let world = World { hidden: Theta { effects: vec![loose], ..well.hidden.clone() }, ..well };
         let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
         on_bench((&cell, &world), &library, |bench, even| {
-            let from = bench.fit((&[], library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let from = bench.fit(&[], library.start(), &[0, 1], even, None, ONCE).expect("a fit");
             let starts = |name| {
                 let candidate = library.find(name).expect("a candidate");
-                scanned(&around(bench, (&from, even)), &nothing_said_of(&library, candidate)).len()
+                scanned(&around(bench, &from, even), &nothing_said_of(&library, candidate)).len()
             };
             // All joints at once, and joint by joint.
             assert_eq!((starts("joint_backlash"), starts("command_delay")), (2, 0));
@@ -292,10 +290,10 @@ mod tests {
         let cell = shipped();
         let world = with_effect("friction_patch", 5, Kind::Strokes, &cell);
         on_strokes((&cell, &world), |bench, even| {
-            let from = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let from = bench.fit(&[], bench.library.start(), &[0, 1], even, None, ONCE).expect("a fit");
             let patch = bench.library.find("friction_patch").expect("a candidate");
-            let starts = placed(&around(bench, (&from, even)), &nothing_said_of(bench.library, patch));
-            assert_eq!(starts.len(), MAX_PLACES);
+            let starts = placed(&around(bench, &from, even), &nothing_said_of(bench.library, patch));
+            assert_eq!(starts.len(), MAX_FORMS);
             let cost = |full: &[f64]| bench.plain_cost(&from.clips(), full, even).expect("strokes");
             let costs: Vec<f64> = starts.iter().map(|full| cost(full)).collect();
             assert!(costs.is_sorted() && costs[0] < cost(&from.full), "{costs:?}");
@@ -310,9 +308,9 @@ mod tests {
         let world = World::draw(3, Kind::Strokes, Fault::Nothing, &cell);
         let tried = on_strokes((&cell, &world), |bench, even| {
             let candidate = bench.library.find("velocity_dependent_friction").expect("a candidate");
-            let baseline = bench.fit((&[], bench.library.start()), &[0, 1], even, None, ONCE).expect("a fit");
+            let baseline = bench.fit(&[], bench.library.start(), &[0, 1], even, None, ONCE).expect("a fit");
             let size = bench.library.candidates[candidate].sizes[0];
-            let from = pointed_at(&around(bench, (&baseline, even)), &nothing_said_of(bench.library, candidate));
+            let from = pointed_at(&around(bench, &baseline, even), &nothing_said_of(bench.library, candidate));
             from.into_iter().map(|full| full[size]).collect::<Vec<f64>>()
         });
         assert!(tried.contains(&0.0), "{tried:?}");

@@ -1,17 +1,15 @@
 //! Fits that are made once more from elsewhere once it is known what else was found: a likelihood ratio compares two maxima, and over
 //! rough hits there are many. Each of them is one more start of the same fit; only where it begins differs.
 
-use crate::diagnose::criteria::ALIKE_SHARE;
+use crate::diagnose::criteria::MOST_OF_IT;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT};
 use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::trial::{Found, LARGE_SHARE_CLOSED, MIN_SHARE_CLOSED, Step, Trial};
 use crate::diagnose::propose::Search;
+use crate::diagnose::propose::screening::MAX_FURTHER;
 use crate::diagnose::select::criteria::EFFECTS;
 use inference::likelihood::Evidence;
-
-/// So many trials of a step are (a choice).
-const MAX_REFITTED: usize = 2;
 
 /// The step with its best trial, fitted to the end, held against its nearest rivals once more, each with the object found anew under
 /// it: with an object that stands in for part of an effect a fit ends somewhere else than with the right one. What acts on the arm the
@@ -26,7 +24,7 @@ pub(super) fn rivals_refitted<E: Evidence>(search: &Search<'_, E>, step: Step, b
         let alike = confidence::rivals(&step, bench.library, chosen, 1.0);
         with_object_anew(search, step, |_, trial| alike.contains(&trial.scored.candidate))
     } else {
-        let least = ALIKE_SHARE * step.trials[added].nats();
+        let least = MOST_OF_IT * step.trials[added].nats();
         with_object_anew(search, step, |k, trial| k != added && trial.nats() > least && !of_arm(bench, trial))
     }
 }
@@ -53,7 +51,7 @@ fn with_object_anew<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: imp
         let anew = search.fits(&fit.effects, &step.weights, fit).fit((search.refined)(&fit.full)?, effort)?;
         (anew.deviance() < fit.deviance()).then_some((place, anew))
     };
-    let fits: Vec<(usize, Hypothesis)> = places.into_iter().take(MAX_REFITTED).filter_map(anew).collect();
+    let fits: Vec<(usize, Hypothesis)> = places.into_iter().take(MAX_FURTHER).filter_map(anew).collect();
     step.with_fits(bench, search.split, fits)
 }
 
@@ -84,7 +82,7 @@ pub(super) fn by_engine<E: Evidence>(search: &Search<'_, E>, fit: Hypothesis, we
     if search.bench.evidence.engine().is_none() || search.bench.interrupt.asked() {
         return fit;
     }
-    search.fits(&fit.effects, weights, &fit).fit(fit.full.clone(), REFINEMENT).unwrap_or(fit)
+    search.onwards(&fit, weights, REFINEMENT).unwrap_or(fit)
 }
 
 /// What was found, baseline and result at their best by the engine. The baseline is fitted once more from where the result ended.

@@ -8,22 +8,20 @@ use super::again::{by_engine, found_by_engine, reconsidered, rivals_refitted, wi
 use super::refit::{fewer, last_pass, refitted};
 use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
 use crate::diagnose::fit::anchored::Anchored;
-use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT, SCREENING};
+use crate::diagnose::fit::shortlist::MAX_FORMS;
 use crate::diagnose::fit::{floor, stages, undetermined};
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::score::predict;
 use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::propose::screening::{arm_gap_is_open, overlooked, seen_at_the_least_scatter, to_fit};
-use crate::diagnose::propose::starts::{self, MAX_PLACES};
+use crate::diagnose::propose::starts;
 use crate::diagnose::propose::{Around, Search, arm_alone, signatures};
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::forward::{Selection, backward, forward};
-use crate::diagnose::select::multi_start::{NEVER_ENOUGH, cheapest};
-use inference::admit::Split;
 use inference::likelihood::{Evidence, Group, Row};
-use shared_mem::progress::Progress;
 
 /// So often at most the steps of a search are begun anew from a better fit of what they extend (a choice).
 const MAX_RESTARTS: usize = 2;
@@ -32,18 +30,11 @@ const NEAR_SHARE: f64 = 0.4;
 /// Engines integrate one and the same effect differently by a hundredth of it, so by this share of the squared gap.
 const NUMERICS_OF_GAP: f64 = 1e-4;
 
-/// Searches from a baseline; `refined` gives numbers whose object is found anew under the effects in them, where there is one.
-pub fn search<E: Evidence>(
-    bench: &Bench<'_, E>,
-    split: &Split,
-    baseline: Hypothesis,
-    refined: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
-    bar: &Progress,
-) -> Option<Found> {
-    let search = &Search { bench, split, refined, bar };
+/// Searches from a baseline.
+pub(super) fn search<E: Evidence>(search: &Search<'_, E>, baseline: Hypothesis) -> Option<Found> {
     let selected = forward(search, baseline)?;
-    let around = Anchored::new(bench.evidence, &selected.last.full);
-    let anchored = around.bench(bench);
+    let around = Anchored::new(search.bench.evidence, &selected.last.full);
+    let anchored = around.bench(search.bench);
     let steps: Vec<Step> = selected.steps.into_iter().map(|tried| tried.step).collect();
     let (near, weights) = (&search.on(&anchored), &steps.last()?.weights);
     let last = undetermined::without(near.bench, &backward(selected.last, |now| fewer(near, now, weights)));
@@ -84,7 +75,7 @@ impl<E: Evidence> Selection for Search<'_, E> {
                 let extended = extended.map(|fit| by_engine(self, fit, &step.weights));
                 return Some((Tried { step, restarts }, extended));
             };
-            self.bar.insert(&stages::FURTHER);
+            self.bar.insert(&stages::planned(&[stages::SIGNATURES, stages::FITS, stages::LAST_FITS]));
             from = by_engine(self, better, &step.weights);
         }
         None
@@ -108,13 +99,13 @@ fn extended<E: Evidence>(search: &Search<'_, E>, step: Step, further: bool) -> O
     }
     search.bar.stage(stages::REFINEMENT, 2);
     if further {
-        search.bar.insert(&stages::FURTHER);
+        search.bar.insert(&stages::planned(&[stages::SIGNATURES, stages::FITS, stages::LAST_FITS]));
     }
-    let to_the_end = refitted(search, (&fit, &step.weights))?;
+    let to_the_end = refitted(search, &fit, &step.weights)?;
     search.bar.show(1, stages::REFINEMENT);
     let step = rivals_refitted(search, step, &to_the_end);
     let extended = match best(&step) {
-        Some(other) if other.effects != to_the_end.effects => Some(refitted(search, (&other, &step.weights))?),
+        Some(other) if other.effects != to_the_end.effects => Some(refitted(search, &other, &step.weights)?),
         Some(_) => Some(to_the_end),
         // Fitted to the end it predicts clips no better than chance: what it did before was the fit's.
         None => None,
@@ -137,8 +128,8 @@ fn is_spent<E: Evidence>(search: &Search<'_, E>, first: &Step, now: &Hypothesis)
 fn tried<E: Evidence>(search: &Search<'_, E>, from: &Hypothesis, first: Option<&Step>) -> Option<Step> {
     let bench = search.bench;
     let (weights, mut scored, narrow) = signatures::around(bench, search.split, from, search.bar)?;
-    let step = begun(search, (from, weights), first)?;
-    let mut promising = to_fit(bench, &step.from, &scored, (&step.whole, &step.left));
+    let step = begun(search, from, weights, first)?;
+    let mut promising = to_fit(bench, &step.from, &scored, &step.whole, &step.left);
     let closed = !arm_gap_is_open(&step.whole, &step.left);
     for seen in closed.then(|| seen_at_the_least_scatter(bench, &step.from, &narrow)).into_iter().flatten() {
         if !promising.contains(&seen.candidate) {
@@ -153,25 +144,26 @@ fn tried<E: Evidence>(search: &Search<'_, E>, from: &Hypothesis, first: Option<&
         return Some(step);
     }
     let rest = overlooked(bench, &step);
-    search.bar.insert(&stages::MORE_FITS);
+    search.bar.insert(&stages::planned(&[stages::FITS, stages::LAST_FITS]));
     Some(fitted(search, step, &rest, true))
 }
 
 /// A step in which nothing is tried: the hypothesis with the weights that it leaves itself.
 fn untried<E: Evidence>(search: &Search<'_, E>, now: &Hypothesis, first: Option<&Step>) -> Option<Step> {
     let left = Residuals::at(search.bench, now, &search.split.train)?;
-    begun(search, (now, floor::weights(search.bench.evidence, &left.clips)), first)
+    begun(search, now, floor::weights(search.bench.evidence, &left.clips), first)
 }
 
 /// A step before anything is tried. Under these weights the hypothesis may be printed, so what acts is fitted to the end again.
 fn begun<E: Evidence>(
     search: &Search<'_, E>,
-    (from, weights): (&Hypothesis, Vec<f64>),
+    from: &Hypothesis,
+    weights: Vec<f64>,
     first: Option<&Step>,
 ) -> Option<Step> {
     let (bench, split) = (search.bench, search.split);
     let effort = if from.effects.is_empty() { REFINEMENT } else { last_pass(bench) };
-    let from = search.fits(&from.effects, &weights, from).fit(from.full.clone(), effort)?;
+    let from = search.onwards(from, &weights, effort)?;
     let predicted = predict(bench, &from, &split.choose, &weights)?;
     let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
     let whole = first.map_or_else(|| left.clone(), |first| first.whole.clone());
@@ -207,8 +199,7 @@ fn fitted<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: &[usize], ove
     let to_the_end = |(done, (place, fit)): (usize, (usize, Hypothesis))| {
         search.bar.show(done as u64, stages::LAST_FITS);
         let effort = bench.trying(step.trials[place].scored.candidate, REFINEMENT);
-        let more = || search.fits(&fit.effects, &step.weights, &fit).fit(fit.full.clone(), effort);
-        let nearer = if fit.deviance() < near { more() } else { None };
+        let nearer = if fit.deviance() < near { search.onwards(&fit, &step.weights, effort) } else { None };
         (place, nearer.unwrap_or(fit))
     };
     let fits: Vec<(usize, Hypothesis)> = fits.into_iter().enumerate().map(to_the_end).collect();
@@ -226,10 +217,5 @@ fn a_little<E: Evidence>(search: &Search<'_, E>, step: &Step, place: usize, over
         return fits.best(starts, effort);
     }
     // What lies in the right place may come down later than what stands in for it elsewhere.
-    let mut places: Vec<Hypothesis> = starts.into_iter().filter_map(|start| fits.fit(start, effort)).collect();
-    places.sort_by(|a, b| a.deviance().total_cmp(&b.deviance()));
-    let effort = bench.trying(scored.candidate, REFINEMENT);
-    let further = |fit: &Hypothesis, effort| search.fits(&effects, &step.weights, fit).fit(fit.full.clone(), effort);
-    let to_the_end = places.iter().take(MAX_PLACES).filter_map(|fit| further(fit, effort));
-    cheapest(to_the_end, NEVER_ENOUGH)
+    fits.best_further(starts, effort, MAX_FORMS, bench.trying(scored.candidate, REFINEMENT))
 }

@@ -1,8 +1,7 @@
 //! The end of each step of the search: what was chosen is fitted to the end, and what it makes superfluous is dropped.
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::effort::{Effort, REFINEMENT};
-use crate::diagnose::fit::sweep::Precision;
+use crate::diagnose::fit::effort::{Effort, LAST_PASS, REFINEMENT};
 use crate::diagnose::judge::score::predict;
 use crate::diagnose::library::Alternative;
 use crate::diagnose::propose::Search;
@@ -11,20 +10,13 @@ use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::multi_start::{NEVER_ENOUGH, cheapest};
 use inference::likelihood::Evidence;
 
-/// The winner is fitted until it has converged, what is held of it with the others: its numbers are the answer. An arm alone
-/// converges well before so many linearisations.
-const LAST_PASS: Effort = Effort { frees_held: true, ..Effort::of(25, Precision::Exact) };
-
 /// Where in its range a held form is tried, and how often the best of these is then looked for halfway to its neighbours (choices).
 const SHARES_OF_RANGE: [f64; 9] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0];
 const HALVINGS: usize = 5;
 
 /// A fit to the end, from where it is and from elsewhere: an effect frees the object's parameters from what they stood in
 /// for, so they are found anew under it, and under the other way in which it could act where there are two.
-pub(super) fn refitted<E: Evidence>(
-    search: &Search<'_, E>,
-    (fit, weights): (&Hypothesis, &[f64]),
-) -> Option<Hypothesis> {
+pub(super) fn refitted<E: Evidence>(search: &Search<'_, E>, fit: &Hypothesis, weights: &[f64]) -> Option<Hypothesis> {
     let (bench, fits) = (search.bench, search.fits(&fit.effects, weights, fit));
     let ways = [Some(fit.full.clone()), other_way(bench, fit)];
     let anew = ways.iter().flatten().filter_map(|full| (search.refined)(full));
@@ -109,6 +101,7 @@ pub(super) fn fewer<E: Evidence>(search: &Search<'_, E>, now: &Hypothesis, weigh
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{on_bench, shipped, truth, with_effect};
     use inference::likelihood::setting;
@@ -132,7 +125,7 @@ mod tests {
             let mut usual = truth.clone();
             held.iter().for_each(|k| usual[*k] = library.start()[*k]);
             let found = |full: Vec<f64>| {
-                let fit = bench.fit((&[candidate], full), &[0, 1], even, None, Effort::of(0, Precision::Joints));
+                let fit = bench.fit(&[candidate], full, &[0, 1], even, None, Effort::of(0, Precision::Joints));
                 scanned(bench, &fit.expect("a fit"), even)
             };
             // Noise may shift it a little.

@@ -3,7 +3,8 @@
 //!
 //! These thresholds are choices; `calibration benchmark` counts how often verdicts that come of them are right.
 
-use super::gain::Gain;
+use super::gain::{Gain, SAME_WORTH_NATS};
+use crate::diagnose::fit::shortlist::BY_CHANCE;
 
 /// Thresholds of one forward selection.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,10 +33,10 @@ pub struct Criteria {
 pub const EFFECTS: Criteria = Criteria {
     max_extensions: 4,
     max_fitted: 5,
-    max_chance: 0.2,
+    max_chance: BY_CHANCE,
     min_promise: 0.1,
-    min_gain_nats: 4.0,
-    max_of_clip_nats: 4.0,
+    min_gain_nats: SAME_WORTH_NATS,
+    max_of_clip_nats: SAME_WORTH_NATS,
     min_agreeing_clips: None,
     min_share: 0.5,
     by_student: false,
@@ -56,20 +57,8 @@ pub const CHANGES: Criteria = Criteria {
 
 impl Criteria {
     /// Whether an extension is fitted whose gain by its slopes noise reaches with this chance, beside the best.
-    pub fn promises(&self, (chance, gain): (f64, f64), best: f64) -> bool {
+    pub fn promises(&self, chance: f64, gain: f64, best: f64) -> bool {
         chance < self.max_chance && gain > self.min_promise * best
-    }
-
-    /// Of candidates, the most promising first, those that are fitted; `said`: how likely noise makes so much of one by its slopes, and how
-    /// much that is.
-    pub fn promising<'a, T>(
-        &'a self,
-        candidates: &'a [T],
-        said: impl Fn(&T) -> (f64, f64) + Copy + 'a,
-    ) -> impl Iterator<Item = &'a T> {
-        let best = candidates.iter().map(|candidate| said(candidate).1).fold(0.0, f64::max);
-        let promising = move |candidate: &&T| self.promises(said(candidate), best);
-        candidates.iter().filter(promising).take(self.max_fitted)
     }
 
     /// What an extension with so many numbers has to be worth [nats].

@@ -7,7 +7,8 @@ use inference::statistics::{median, student_sigmas};
 const MAX_OF_MEDIAN: f64 = 5.0;
 /// What chance makes of a gain reaches so many standard errors, were these known exactly: 2.3 % of a normal distribution lie above.
 const CHANCE_SIGMAS: f64 = 2.0;
-/// Models are worth the same that differ by less [nats]: a likelihood ratio of 55.
+/// Models are worth the same that differ by less [nats]: a likelihood ratio of 55. Nats count less than they say, since twins are never
+/// exact: over this temperature shares of the evidence agree with frequencies.
 pub const SAME_WORTH_NATS: f64 = 4.0;
 /// More than this share of the clips is nearly all of them: 11 of 12 do not agree by chance (p = 0.003).
 const NEARLY_ALL_CLIPS: f64 = 0.85;

@@ -47,12 +47,26 @@ pub struct MultiStart<'a, E: Likelihood> {
 impl<E: Likelihood> MultiStart<'_, E> {
     /// From one start.
     pub fn fit(&self, full: Vec<f64>, effort: Effort) -> Option<Hypothesis<E::Own>> {
-        self.bench.fit((self.effects, full), self.clips, self.weights, self.near, effort)
+        self.bench.fit(self.effects, full, self.clips, self.weights, self.near, effort)
     }
 
     /// The cheapest of fits from several starts.
     pub fn best(&self, starts: impl IntoIterator<Item = Vec<f64>>, effort: Effort) -> Option<Hypothesis<E::Own>> {
         cheapest(starts.into_iter().filter_map(|full| self.fit(full, effort)), NEVER_ENOUGH)
+    }
+
+    /// Fits from several starts, `count` of the cheapest fitted further, and the cheapest of these.
+    pub fn best_further(
+        &self,
+        starts: impl IntoIterator<Item = Vec<f64>>,
+        effort: Effort,
+        count: usize,
+        further: Effort,
+    ) -> Option<Hypothesis<E::Own>> {
+        let mut begun: Vec<_> = starts.into_iter().filter_map(|full| self.fit(full, effort)).collect();
+        begun.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
+        let onwards = |fit: &Hypothesis<E::Own>| MultiStart { near: Some(fit), ..*self }.fit(fit.full.clone(), further);
+        cheapest(begun.iter().take(count).filter_map(onwards), NEVER_ENOUGH)
     }
 }
 

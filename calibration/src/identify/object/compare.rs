@@ -4,10 +4,9 @@
 //! (PIN-WM).
 
 use super::figures::{figures, gaps};
-use super::fit::{fit_object, usual_evaluations};
 use super::material::Material;
 use super::paper::SurfaceLoss;
-use super::polish::{fit_polished, fit_poses_alone};
+use super::polish::{fit_polished, fit_poses_alone, usual_evaluations};
 use super::{Options, Problem};
 use crate::answer::identification::Figures;
 use crate::identify::error::IdentifyError;
@@ -17,6 +16,7 @@ use inference::interrupt::Interrupt;
 use inference::kept::Kept;
 use inference::likelihood::object::ObjectClips;
 use inference::likelihood::{Setting, Settings};
+use inference::object_fit::fit_object;
 use serde::Serialize;
 use shared_mem::progress::Progress;
 use std::collections::BTreeMap;

@@ -1,11 +1,11 @@
 //! What a fit says about the object, number by number: what the clips cannot tell and why, and what to record next.
 
 use super::Problem;
-use super::fit::ObjectFit;
 use super::material::Material;
 use crate::answer::identification::{Identification, NotIdentifiable};
 use crate::identify::finding::Finding;
 use inference::likelihood::Setting;
+use inference::object_fit::ObjectFit;
 
 /// A number is not identifiable where half its interval is more than this share of its range (a choice),
 const OPEN_FROM_SHARE_OF_RANGE: f64 = 0.25;

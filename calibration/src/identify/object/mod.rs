@@ -5,8 +5,6 @@
 //! | file | owns |
 //! |---|---|
 //! | `material` | a session's clips, sorted by their use |
-//! | `fit` | the likelihood fit |
-//! | `step` | one step of it |
 //! | `paper` | the loss on the object's surface, for searches without slopes |
 //! | `parts` | how sure tosses leave the numbers |
 //! | `polish` | the last stretch to that loss |
@@ -20,27 +18,25 @@ pub mod compare;
 mod doubt;
 mod figures;
 mod finding;
-mod fit;
 mod material;
 mod paper;
 mod parts;
 mod polish;
-mod step;
 mod vicinity;
 
 use super::error::IdentifyError;
 pub use super::options::Options;
 use super::run::{Optimizer, Outcome, Run, Work, concluded};
 use crate::answer::identification::Identification;
-use fit::{ObjectFit, fit_object, linearise_object};
 use inference::controller;
-use inference::engine::{Engine, Used};
+use inference::engine::Used;
 use inference::estimate::Unknown;
 use inference::interrupt::Interrupt;
-use inference::kept::{self, Fingerprint, Kept};
+use inference::kept::{self, Fingerprint};
+use inference::likelihood::Settings;
 use inference::likelihood::object::ObjectClips;
 use inference::likelihood::setting::{complete, object_parameters};
-use inference::likelihood::{Setting, Settings};
+use inference::object_fit::{ObjectFit, linearise_object, widths};
 use material::Material;
 use paper::SurfaceLoss;
 use parts::disagreement;
@@ -50,7 +46,6 @@ use shared_mem::progress::Progress;
 use shared_mem::recording::{Clip, SessionFiles};
 use shared_mem::theta::Theta;
 use shared_mem::toml_file;
-use std::sync::Arc;
 use std::time::Instant;
 use twin::scene::{ObjectModel, ObjectShape};
 
@@ -184,14 +179,14 @@ impl Problem {
             run.search(&loss, &loss)?
         };
         let at = linearise_object(clips, &self.unknowns, &outcome.fit.shared)?;
-        let widths = fit::widths(clips, &self.unknowns, &at)?;
+        let widths = widths(clips, &self.unknowns, &at)?;
         let Outcome { simulated: evaluations, convergence, arrived: converged, .. } = outcome;
         Ok(ObjectFit { at, widths, evaluations, convergence, converged })
     }
 
     fn least_squares(&self, clips: &mut ObjectClips, run: &Run<'_>) -> Result<ObjectFit, IdentifyError> {
         let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
-        let bar = Progress::new("identify", fit::usual_evaluations(clips, &self.unknowns) as u64);
+        let bar = Progress::new("identify", polish::usual_evaluations(clips, &self.unknowns) as u64);
         let shape = self.shape(clips)?;
         let trail = (run.kept, "fit");
         Ok(fit_polished(clips, self.searched(&shape, run.seed), &start, trail, |_, evaluations| {
@@ -211,25 +206,6 @@ impl Problem {
 
 /// What is searched of an object.
 fn searched(cell: &Cell, base: Theta) -> (Settings, Vec<Unknown>) {
-    let (settings, unknowns): (Vec<Setting>, Vec<Unknown>) = object_parameters(cell, &base).into_iter().unzip();
+    let (settings, unknowns): (Vec<_>, Vec<_>) = object_parameters(cell, &base).into_iter().unzip();
     (Settings::new(base, settings), unknowns)
-}
-
-/// `base` with the object's parameters that fit strokes best under its gains and effects: where a diagnosis begins.
-///
-/// # Errors
-/// [`IdentifyError`] when the cell cannot be simulated with `base`.
-pub fn refine(
-    (cell, engine): (&Cell, Option<&Arc<Engine>>),
-    clips: Vec<Clip>,
-    base: &Theta,
-    interrupt: &Interrupt,
-) -> Result<Theta, IdentifyError> {
-    let (settings, unknowns) = searched(cell, base.clone());
-    let clips = ObjectClips::new(cell, clips, settings.clone())?;
-    let mut clips = clips.simulated_by(engine, &complete(cell, None)?);
-    let start: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
-    let trail = (Kept::nothing(), "");
-    let found = fit_object(&mut clips, &unknowns, &start, trail, |_, _| !interrupt.asked())?;
-    Ok(settings.theta(&found.at.shared))
 }

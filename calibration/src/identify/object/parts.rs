@@ -4,13 +4,13 @@
 //! parts of the tosses, each fitted by itself, do: their spread is that of the answer, whatever the reason.
 
 use super::Problem;
-use super::fit::fit_object;
 use super::polish::let_go;
 use crate::identify::error::IdentifyError;
 use crate::identify::run::Work;
 use inference::estimate::ClipModel as _;
 use inference::estimate::interval::LEVEL;
 use inference::likelihood::object::ObjectClips;
+use inference::object_fit::fit_object;
 use inference::statistics::student;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;

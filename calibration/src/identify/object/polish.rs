@@ -7,14 +7,14 @@
 //!
 //! [`ModelError::flat`]: inference::likelihood::object::ModelError::flat
 
-use super::fit::{ObjectFit, fit_object, linearise_object, roughly};
 use super::paper::SurfaceLoss;
-use super::step::Linearised;
-use super::vicinity::descend;
+use super::vicinity::{descend, points};
 use inference::estimate::{ClipModel as _, Impossible, Unknown};
 use inference::kept::{Kept, Trail};
 use inference::likelihood::Setting;
 use inference::likelihood::object::ObjectClips;
+use inference::object_fit::step::Linearised;
+use inference::object_fit::{ObjectFit, fit_object, linearise_object, roughly};
 use nalgebra::{DMatrix, DVector};
 use shared_mem::cell::ClipKind;
 use twin::scene::ObjectShape;
@@ -29,6 +29,11 @@ pub(super) struct Searched<'a> {
     pub(super) settings: &'a [Setting],
     pub(super) shape: &'a ObjectShape,
     pub(super) seed: u64,
+}
+
+/// Clips that are usually simulated until the end: for a bar alone.
+pub(super) fn usual_evaluations(clips: &ObjectClips, unknowns: &[Unknown]) -> usize {
+    inference::object_fit::usual_evaluations(clips, unknowns) + points(unknowns.len()) * clips.clips()
 }
 
 /// The likelihood fit and, of strokes, from there on to the paper's loss. What was let go begins with a motion of its own,

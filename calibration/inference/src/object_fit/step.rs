@@ -4,38 +4,38 @@
 //! elsewhere than simulated finds its own way first. A clip that nothing fits counts less, so that it does not steer
 //! the others.
 
-use inference::estimate::interval::LEVEL;
-use inference::estimate::profile::{Profile, profiled};
-use inference::estimate::solve::{Descent, End, Problem, Quadratic, Schedule, Trial, descend};
-use inference::estimate::{ClipFit, Fit, Impossible, Intervals, Random, Unknown, at_bounds, without_leaning};
-use inference::likelihood::object::ObjectClips;
+use crate::estimate::interval::LEVEL;
+use crate::estimate::profile::{Profile, profiled};
+use crate::estimate::solve::{Descent, End, Problem, Quadratic, Schedule, Trial, descend};
+use crate::estimate::{ClipFit, Fit, Impossible, Intervals, Random, Unknown, at_bounds, without_leaning};
+use crate::likelihood::object::ObjectClips;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What is asked of the clips.
 #[derive(Clone, Copy)]
-pub(super) struct Question<'a> {
-    pub(super) clips: &'a ObjectClips,
+pub struct Question<'a> {
+    pub clips: &'a ObjectClips,
     /// The shared parameters.
-    pub(super) unknowns: &'a [Unknown],
+    pub unknowns: &'a [Unknown],
     /// The nuisance parameters.
-    pub(super) random: &'a [Random],
+    pub random: &'a [Random],
 }
 
 /// All clips around one point, nuisance parameters at their best.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Linearised {
+pub struct Linearised {
     /// The shared parameters.
-    pub(super) shared: Vec<f64>,
+    pub shared: Vec<f64>,
     /// The clips there.
-    pub(super) clips: Vec<ClipFit>,
+    pub clips: Vec<ClipFit>,
     /// How much each counts: 1, less where nothing fits.
-    pub(super) weights: Vec<f64>,
+    pub weights: Vec<f64>,
     /// Whether the step that led here was small against what the clips can tell.
-    pub(super) small: bool,
+    pub small: bool,
     /// Calls of the model that led here.
-    pub(super) evaluations: usize,
+    pub evaluations: usize,
 }
 
 /// How much wider an interval may get by a look at the deviance.
@@ -49,17 +49,17 @@ const OUTLIER_MISFIT: f64 = 4.0;
 
 impl Linearised {
     /// `-2 ln` of the likelihood of all clips.
-    pub(super) fn deviance(&self) -> f64 {
+    pub fn deviance(&self) -> f64 {
         self.clips.iter().zip(&self.weights).map(|(clip, weight)| weight * clip.deviance).sum()
     }
 
     /// The clips' nuisance parameters.
-    pub(super) fn own(&self) -> Vec<Vec<f64>> {
+    pub fn own(&self) -> Vec<Vec<f64>> {
         self.clips.iter().map(|clip| clip.own.clone()).collect()
     }
 
     /// Information on the shared parameters.
-    pub(super) fn information(&self) -> DMatrix<f64> {
+    pub fn information(&self) -> DMatrix<f64> {
         let n = self.shared.len();
         let parts = self.clips.iter().zip(&self.weights);
         parts.fold(DMatrix::zeros(n, n), |sum, (clip, weight)| sum + &clip.information * *weight)
@@ -67,7 +67,7 @@ impl Linearised {
 
     /// The estimate of the shared parameters to first order: the clips as much as each counts, wanting what they would want
     /// had they been left out; which numbers rest on a bound; how sure the others are.
-    pub(super) fn estimate(&self, unknowns: &[Unknown]) -> (Fit, Vec<bool>, Intervals) {
+    pub fn estimate(&self, unknowns: &[Unknown]) -> (Fit, Vec<bool>, Intervals) {
         let mut clips = self.clips.clone();
         for (clip, weight) in clips.iter_mut().zip(&self.weights) {
             clip.information *= *weight;
@@ -93,7 +93,7 @@ impl Question<'_> {
     ///
     /// # Errors
     /// [`Impossible`] when a clip cannot be simulated there.
-    pub(super) fn improved(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
+    pub fn improved(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
         let mut strokes = Strokes { question: *self, evaluations: 0 };
         let place = strokes.profiled(shared, own)?;
         let mut way = Descent { place, slopes: None, damping: SHARED_STEP.damping };
@@ -109,7 +109,7 @@ impl Question<'_> {
     ///
     /// # Errors
     /// As [`Self::improved`].
-    pub(super) fn here(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
+    pub fn here(&self, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
         let mut strokes = Strokes { question: *self, evaluations: 0 };
         let place = strokes.profiled(shared, own)?;
         let at = strokes.linearised(&place)?;
@@ -122,7 +122,7 @@ impl Question<'_> {
     ///
     /// # Errors
     /// As [`Self::improved`].
-    pub(super) fn widths(&self, at: &Linearised, half: &[f64]) -> Result<(Vec<f64>, usize), Impossible> {
+    pub fn widths(&self, at: &Linearised, half: &[f64]) -> Result<(Vec<f64>, usize), Impossible> {
         let n = at.shared.len();
         let (own, mut strokes) = (at.own(), Strokes { question: *self, evaluations: 0 });
         let information = at.information();

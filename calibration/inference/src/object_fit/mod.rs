@@ -5,28 +5,31 @@
 //! millimetres. Slopes are therefore taken over wide steps, the error of the hit is part of the likelihood (one error of
 //! a clip's whole rest, not one of each pose), and a clip that nothing fits counts less. What the arm felt counts as well:
 //! the blow that it takes says how heavy the object is.
+//!
+//! [`step`] owns one step of it.
 
-use super::step::{Linearised, Question};
-use super::vicinity::points;
-use inference::estimate::{ClipModel as _, Impossible, Random, Unknown};
-use inference::kept::{Fingerprint, Kept, Trail};
-use inference::likelihood::object::{Channel, ModelError, ObjectClips, Part};
+pub mod step;
+
+use crate::estimate::{ClipModel as _, Impossible, Random, Unknown};
+use crate::kept::{Fingerprint, Kept, Trail};
+use crate::likelihood::object::{Channel, ModelError, ObjectClips, Part};
 use rayon::prelude::*;
 use shared_mem::cell::PoseNoise;
+use step::{Linearised, Question};
 
 /// A fit, and what it assumed at last.
 #[derive(Debug, Clone)]
-pub(super) struct ObjectFit {
+pub struct ObjectFit {
     /// The numbers, linearised there.
-    pub(super) at: Linearised,
+    pub at: Linearised,
     /// By how much wider than information says each number's interval is.
-    pub(super) widths: Vec<f64>,
+    pub widths: Vec<f64>,
     /// Calls of the model: clips simulated, wholly or from the release on.
-    pub(super) evaluations: usize,
+    pub evaluations: usize,
     /// Clips simulated so far, and the deviance per row then.
-    pub(super) convergence: Vec<[f64; 2]>,
+    pub convergence: Vec<[f64; 2]>,
     /// Whether the last step was small.
-    pub(super) converged: bool,
+    pub converged: bool,
 }
 
 /// What the search trusts a simulated clip to at first: poses as far as their noise, so that the resting places lead.
@@ -47,15 +50,15 @@ const CORRELATED_ROWS: f64 = 5.0;
 const MIN_JOINT_ERROR: f64 = 2e-5;
 
 /// Clips that are usually simulated until the end: for a bar alone.
-pub(super) fn usual_evaluations(clips: &ObjectClips, unknowns: &[Unknown]) -> usize {
-    (2 * (INITIAL_STEPS + ERROR_ROUNDS) * (2 + unknowns.len()) + points(unknowns.len())) * clips.clips()
+pub fn usual_evaluations(clips: &ObjectClips, unknowns: &[Unknown]) -> usize {
+    2 * (INITIAL_STEPS + ERROR_ROUNDS) * (2 + unknowns.len()) * clips.clips()
 }
 
 /// Fits from `start` on. `watch` sees numbers and evaluations after every step; `false` ends the fit there.
 ///
 /// # Errors
 /// [`Impossible`] when the cell cannot be simulated at the start.
-pub(super) fn fit_object(
+pub fn fit_object(
     clips: &mut ObjectClips,
     unknowns: &[Unknown],
     start: &[f64],
@@ -86,7 +89,7 @@ pub(super) fn fit_object(
 ///
 /// # Errors
 /// As [`fit_object`].
-pub(super) fn roughly(
+pub fn roughly(
     clips: &mut ObjectClips,
     unknowns: &[Unknown],
     start: &[f64],
@@ -101,11 +104,7 @@ pub(super) fn roughly(
 ///
 /// # Errors
 /// [`Impossible`] when the cell cannot be simulated there.
-pub(super) fn linearise_object(
-    clips: &mut ObjectClips,
-    unknowns: &[Unknown],
-    at: &[f64],
-) -> Result<Linearised, Impossible> {
+pub fn linearise_object(clips: &mut ObjectClips, unknowns: &[Unknown], at: &[f64]) -> Result<Linearised, Impossible> {
     clips.set_model_error(INITIAL_MODEL_ERROR);
     let random = clips.random().random;
     let own = vec![vec![0.0; random.len()]; clips.clips()];
@@ -120,7 +119,7 @@ pub(super) fn linearise_object(
 ///
 /// # Errors
 /// As [`linearise_object`].
-pub(super) fn widths(clips: &ObjectClips, unknowns: &[Unknown], at: &Linearised) -> Result<Vec<f64>, Impossible> {
+pub fn widths(clips: &ObjectClips, unknowns: &[Unknown], at: &Linearised) -> Result<Vec<f64>, Impossible> {
     let half = at.estimate(unknowns).2.half_width;
     Ok(Question { clips, unknowns, random: &clips.random().random }.widths(at, &half)?.0)
 }
