@@ -14,8 +14,6 @@ const NOT_YET: &[&str] = &[
     "calibration/inference/src/likelihood/object/deviations.rs",
     "calibration/inference/src/likelihood/setting/search.rs",
     "calibration/src/diagnose/conclude/advice.rs",
-    "calibration/src/diagnose/criteria.rs",
-    "calibration/src/diagnose/fit/stages.rs",
     "calibration/src/identify/figures.rs",
     "calibration/src/identify/run.rs",
 ];

@@ -12,6 +12,6 @@ pub mod identification;
 mod size;
 mod trace;
 
-pub(crate) use size::numbers;
 pub use size::{Size, effect_in_words};
+pub(crate) use size::{numbers, one_or_list};
 pub use trace::Trace;

@@ -2,14 +2,16 @@
 
 use crate::words::parameters::{Numbers, of_joints};
 use crate::words::words;
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
-/// One number, or one a joint or axis.
-#[derive(Debug, Clone, PartialEq)]
+/// One number, or one a joint or axis. As JSON, `{"value", "ci90", "unit"}`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Size {
+    #[serde(rename = "value", serialize_with = "one_or_list")]
     pub values: Vec<f64>,
     /// A 90 % interval each.
+    #[serde(serialize_with = "one_or_list")]
     pub ci90: Vec<[f64; 2]>,
     /// SI unit; `1` without.
     pub unit: String,
@@ -22,19 +24,14 @@ impl Size {
     }
 }
 
-impl Serialize for Size {
-    /// `{"value", "ci90", "unit"}`: a single number stands by itself, several as lists.
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut out = serializer.serialize_struct("Size", 3)?;
-        if let ([value], [interval]) = (&self.values[..], &self.ci90[..]) {
-            out.serialize_field("value", value)?;
-            out.serialize_field("ci90", interval)?;
-        } else {
-            out.serialize_field("value", &self.values)?;
-            out.serialize_field("ci90", &self.ci90)?;
-        }
-        out.serialize_field("unit", &self.unit)?;
-        out.end()
+/// As JSON, a single value stands by itself, and several are a list.
+///
+/// # Errors
+/// As of the value itself.
+pub(crate) fn one_or_list<T: Serialize, S: Serializer>(values: &[T], serializer: S) -> Result<S::Ok, S::Error> {
+    match values {
+        [one] => one.serialize(serializer),
+        several => several.serialize(serializer),
     }
 }
 

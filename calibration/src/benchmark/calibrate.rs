@@ -106,7 +106,7 @@ pub fn regenerate(sessions: &[Labelled]) -> Vec<Regenerated> {
     };
     let share_left = |sensors| quantile(named().filter_map(|session| session.share_left(sensors)));
     let said = |kind| all().filter(move |session| session.is(kind));
-    let far_below_doubt = |session: &&Labelled| session.gaps() < 0.5 * criteria::DOUBTFUL.value;
+    let far_below_doubt = |session: &&Labelled| session.gaps() < 0.5 * criteria::DOUBTFUL_EXCESS.value;
     let plain = |session: &&Labelled| session.has_a_plain_gap();
     let outside = |session: &Labelled| !session.truth.known;
     let [doubtful, turns] = unseen(sessions);
@@ -117,7 +117,7 @@ pub fn regenerate(sessions: &[Labelled]) -> Vec<Regenerated> {
         (criteria::OBJECT_EXCESS_BESIDE_A_CAUSE, beside(Sensors::Object)),
         (criteria::JOINTS_SHARE_LEFT, share_left(Sensors::Joints)),
         (criteria::OBJECT_SHARE_LEFT, share_left(Sensors::Object)),
-        (criteria::DOUBTFUL, doubtful),
+        (criteria::DOUBTFUL_EXCESS, doubtful),
         (criteria::TURNS_WITHIN, turns),
         (criteria::NONE_IS_RIGHT, rate(said("none").filter(far_below_doubt), Labelled::nothing_is_hidden)),
         (criteria::CLASS_IS_RIGHT, rate(said("class"), Labelled::holds_what_is_hidden)),
@@ -313,10 +313,14 @@ mod tests {
         let with = (0..20).map(|k| gaps(0.5 + 0.05 * f64::from(k), &["table_tilt"]));
         let sessions: Vec<Labelled> = without.chain(with).collect();
         let [doubtful, turns] =
-            [&criteria::DOUBTFUL, &criteria::TURNS_WITHIN].map(|c| found(&sessions, c).from_sessions);
+            [&criteria::DOUBTFUL_EXCESS, &criteria::TURNS_WITHIN].map(|c| found(&sessions, c).from_sessions);
         assert!(doubtful.is_some_and(|half| (0.65..0.85).contains(&half)), "{doubtful:?}");
         assert!(turns.is_some_and(|within| (0.05..0.3).contains(&within)), "{turns:?}");
-        assert_eq!(found(&sessions[..22], &criteria::DOUBTFUL).from_sessions, None, "two with a cause are too few");
+        assert_eq!(
+            found(&sessions[..22], &criteria::DOUBTFUL_EXCESS).from_sessions,
+            None,
+            "two with a cause are too few"
+        );
     }
 
     #[test]

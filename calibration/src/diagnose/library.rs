@@ -373,9 +373,7 @@ fn alternatives(
         _ => None,
     });
     let probes: Vec<Probe> = match angle {
-        Some((angles, quarter)) => {
-            [0.0, quarter].map(|angle| across((sizes, numbers), (&angles, angle), robot)).concat()
-        }
+        Some((angles, quarter)) => [0.0, quarter].map(|angle| across(sizes, numbers, &angles, angle, robot)).concat(),
         None => sizes.iter().map(probe).collect(),
     };
     let with = |form: Vec<(usize, f64)>| Alternative { form, probes: probes.clone() };
@@ -412,11 +410,7 @@ fn alternatives(
 }
 
 /// Every size at an angle, as strong as a probe of it is.
-fn across(
-    (sizes, numbers): (&[usize], &[(Setting, Unknown)]),
-    (angles, angle): (&[usize], f64),
-    robot: &Robot,
-) -> Vec<Probe> {
+fn across(sizes: &[usize], numbers: &[(Setting, Unknown)], angles: &[usize], angle: f64, robot: &Robot) -> Vec<Probe> {
     let share = 2.0 * PROBE_SHARE;
     let of = |(size, number): (&usize, &usize)| {
         let [_, strongest] = plausible(robot, &numbers[*size].0).expect("a size is a parameter");

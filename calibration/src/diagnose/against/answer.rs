@@ -1,7 +1,7 @@
 //! The answer of a comparison of two sessions, as it is written to a file and shown on the page.
 
 use crate::answer::diagnosis::{Clips, Gap, Kind, Place, Share, Status};
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use crate::answer::one_or_list;
 use shared_mem::recording::SessionFiles;
 use shared_mem::theta::Theta;
 use std::collections::BTreeMap;
@@ -83,22 +83,27 @@ pub struct Candidate {
 }
 
 /// A parameter in both sessions, in SI.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Values {
+    #[serde(serialize_with = "one_or_list")]
     pub a: Vec<f64>,
+    #[serde(serialize_with = "one_or_list")]
     pub b: Vec<f64>,
     /// B less A.
+    #[serde(serialize_with = "one_or_list")]
     pub change: Vec<f64>,
     /// A 95 % interval of each change.
+    #[serde(serialize_with = "one_or_list")]
     pub ci95: Vec<[f64; 2]>,
     /// SI unit; `1` without.
     pub unit: String,
 }
 
 /// The smallest change of each number of a parameter that would have been seen.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Smallest {
     /// Of each number alone.
+    #[serde(rename = "value", serialize_with = "one_or_list")]
     pub values: Vec<f64>,
     pub unit: String,
 }
@@ -107,39 +112,6 @@ impl Values {
     pub(super) fn new(unit: &str) -> Self {
         let nothing = Vec::new;
         Self { a: nothing(), b: nothing(), change: nothing(), ci95: Vec::new(), unit: unit.to_owned() }
-    }
-}
-
-impl Serialize for Values {
-    /// `{"a", "b", "change", "ci95", "unit"}`: a single number stands by itself, several as lists.
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut out = serializer.serialize_struct("Values", 5)?;
-        if let ([a], [b], [change], [ci95]) = (&self.a[..], &self.b[..], &self.change[..], &self.ci95[..]) {
-            out.serialize_field("a", a)?;
-            out.serialize_field("b", b)?;
-            out.serialize_field("change", change)?;
-            out.serialize_field("ci95", ci95)?;
-        } else {
-            out.serialize_field("a", &self.a)?;
-            out.serialize_field("b", &self.b)?;
-            out.serialize_field("change", &self.change)?;
-            out.serialize_field("ci95", &self.ci95)?;
-        }
-        out.serialize_field("unit", &self.unit)?;
-        out.end()
-    }
-}
-
-impl Serialize for Smallest {
-    /// `{"value", "unit"}`.
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut out = serializer.serialize_struct("Smallest", 2)?;
-        match &self.values[..] {
-            [value] => out.serialize_field("value", value)?,
-            values => out.serialize_field("value", values)?,
-        }
-        out.serialize_field("unit", &self.unit)?;
-        out.end()
     }
 }
 

@@ -70,7 +70,7 @@ pub(super) fn conclude<E: Evidence>(
     let gap = Sizes::of(pair_bench.bench, ([&under_a, fits], [&before, after]), session, &case.pair.admitted)?
         .gap(([&before, after], Left::of_all_sensors(&before.typical(), &after.typical())), options.seed);
     let (gap_of_a, places) = (of_a(pair_bench, case), localise::localise(pair_bench.bench.evidence, &before));
-    let candidates = candidates(pair_bench, case, (kind, &rivals), (&before, options.seed));
+    let candidates = candidates(pair_bench, case, kind, &rivals, &before, options.seed);
     let changes: Vec<String> = if believed { named(case, &rivals) } else { Vec::new() };
     let facts = Facts::of(&candidates, gap.shrink, deviates.unwrap_or(1.0), places.first());
     let text = headline::sentence(kind, &facts);
@@ -130,7 +130,7 @@ fn rivals<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<us
     for step in found.steps.iter().filter(|step| step.added.is_some_and(|added| found.last.changed.contains(&added))) {
         let others = step.rivals(pair_bench).into_iter().filter(|trial| !found.last.changed.contains(&trial.subject));
         let alike = others
-            .filter(|trial| found.last.changed.len() == 1 || found.stands_in(pair_bench, case.subjects, (step, trial)));
+            .filter(|trial| found.last.changed.len() == 1 || found.stands_in(pair_bench, case.subjects, step, trial));
         rivals.extend(alike.map(|trial| trial.subject));
     }
     rivals.sort_unstable();
@@ -157,8 +157,10 @@ fn shared<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<St
 fn candidates<E: Evidence>(
     pair_bench: &PairBench<'_, E>,
     case: &Case<'_>,
-    (kind, rivals): (Kind, &[usize]),
-    (before, seed): (&Residuals, u64),
+    kind: Kind,
+    rivals: &[usize],
+    before: &Residuals,
+    seed: u64,
 ) -> Vec<Candidate> {
     let (found, first) = (case.found, &case.found.steps[0]);
     let likely = probabilities(&found.steps);

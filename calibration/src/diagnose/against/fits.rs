@@ -71,7 +71,7 @@ impl<E: Evidence> PairBench<'_, E> {
     /// Numbers of B for clips of B that they were not fitted to.
     pub(super) fn held_out(&self, fitted: &Fitted, weights: &[f64]) -> Option<held_out::Fits> {
         let fits =
-            self.on_bench(&fitted.model, |bench| held_out::fits(bench, self.split, (&fitted.hypothesis, weights)))?;
+            self.on_bench(&fitted.model, |bench| held_out::fits(bench, self.split, &fitted.hypothesis, weights))?;
         let of_b = |(fit, clips): (Hypothesis, Vec<usize>)| {
             let clips: Vec<usize> = clips.into_iter().filter(|clip| self.is_of_b(*clip)).collect();
             (numbers(fitted.model.full(Side::B, &fit.full)), clips)

@@ -95,7 +95,7 @@ impl Slopes {
 
     /// One sigma of the coefficient of a column, those of the others at their best: the larger of what the curvature says and what
     /// the scatter of the clips' slopes says (a sandwich).
-    fn sigma(&self, (others, held): (&[Place], &[f64]), column: Place) -> f64 {
+    fn sigma(&self, others: &[Place], held: &[f64], column: Place) -> f64 {
         let columns = [others, &[column]].concat();
         let form = self.form(&columns);
         let count = others.len();
@@ -154,9 +154,9 @@ impl Slopes {
             .filter_map(|(index, subject)| {
                 let is_in = subject.is_in(shared);
                 if is_in {
-                    self.of_known(bench.library, model, (index, subject))
+                    self.of_known(bench.library, model, index, subject)
                 } else {
-                    self.of_new(bench, model, (index, subject))
+                    self.of_new(bench, model, index, subject)
                 }
             })
             .collect();
@@ -190,7 +190,7 @@ impl Slopes {
     }
 
     /// Of something that the model has in both sessions.
-    fn of_known(&self, library: &Library, model: &Model, (index, subject): (usize, &Subject)) -> Option<Score> {
+    fn of_known(&self, library: &Library, model: &Model, index: usize, subject: &Subject) -> Option<Score> {
         let turned: Vec<usize> =
             subject.turned.iter().copied().filter(|k| self.place(Side::B, Column::Number(*k)).is_some()).collect();
         let extra: Vec<(Place, f64)> =
@@ -204,7 +204,7 @@ impl Slopes {
         let same = model.values.clone();
         let (others, held) = self.nuisance(library, model);
         let sigma = extra.iter().zip(&turned).filter(|(_, k)| subject.sizes.contains(k));
-        let sigma = sigma.map(|((column, _), k)| (*k, self.sigma((&others, &held), *column))).collect();
+        let sigma = sigma.map(|((column, _), k)| (*k, self.sigma(&others, &held, *column))).collect();
         let cost = turned.len();
         (cost > 0).then(|| Score {
             subject: index,
@@ -222,7 +222,8 @@ impl Slopes {
         &self,
         bench: &Bench<'_, E>,
         model: &Model,
-        (index, subject): (usize, &Subject),
+        index: usize,
+        subject: &Subject,
     ) -> Option<Score> {
         let library = bench.library;
         let candidate = subject.effect?;
@@ -263,7 +264,7 @@ impl Slopes {
             let [in_a, in_b] = SIDES.map(|side| self.place(side, Column::Probe(candidate, alternative, probe)));
             let others = [&others[..], &[[in_a, in_b]]].concat();
             let held = [&held[..], &[info.largest.powi(-2)]].concat();
-            (size, (at_one - library.unknowns[size].start).abs() * self.sigma((&others, &held), [None, in_b]))
+            (size, (at_one - library.unknowns[size].start).abs() * self.sigma(&others, &held, [None, in_b]))
         });
         let sigma = sigma.collect();
         Some(Score { subject: index, gain, gain_shared: both.gain, cost: count, p: chance(gain, count), starts, sigma })
@@ -318,7 +319,7 @@ mod tests {
         let forms = clips.each_ref().map(|clips: &Vec<DMatrix<f64>>| &clips[0] + &clips[1]);
         let nothing = || Swept { columns: Vec::new(), scatter: RandomEffects::default(), clips: Vec::new() };
         let slopes = Slopes { swept: [nothing(), nothing()], weights: Vec::new(), forms, clips };
-        slopes.sigma((&[[Some(1), Some(1)]], &[0.0]), [None, Some(1)])
+        slopes.sigma(&[[Some(1), Some(1)]], &[0.0], [None, Some(1)])
     }
 
     #[test]

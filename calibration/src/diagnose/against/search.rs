@@ -260,7 +260,8 @@ impl Found {
         &self,
         pair_bench: &PairBench<'_, E>,
         subjects: &[Subject],
-        (step, rival): (&Step, &Trial),
+        step: &Step,
+        rival: &Trial,
     ) -> bool {
         let (Some(added), last) = (step.added, &self.last.fitted) else { return false };
         let subject = &subjects[rival.subject];

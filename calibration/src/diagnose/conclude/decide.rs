@@ -37,7 +37,7 @@ pub(super) fn decide<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -
     let unexplained = decision.kind == Kind::Unexplained;
     let before = &measures.without.left;
     let proven =
-        || partly::proven(case.bench, (case.split, case.found), before, &measures.overdispersion, case.options.seed);
+        || partly::proven(case.bench, case.split, case.found, before, &measures.overdispersion, case.options.seed);
     let partly = if unexplained { proven() } else { None };
     Decided { finding, decision, partly }
 }

@@ -72,7 +72,7 @@ fn on_confirm<E: Evidence>(
     hypothesis: &Hypothesis,
     weights: &[f64],
 ) -> Result<OnConfirm, DiagnoseError> {
-    let fits = held_out::fits(case.bench, case.split, (hypothesis, weights)).ok_or(DiagnoseError::NoBaseline)?;
+    let fits = held_out::fits(case.bench, case.split, hypothesis, weights).ok_or(DiagnoseError::NoBaseline)?;
     let left = Residuals::of(case.bench, &fits).ok_or(DiagnoseError::NoBaseline)?;
     Ok(OnConfirm { places: localise(case.bench.evidence, &left), fits, left })
 }

@@ -39,7 +39,7 @@ pub(super) fn candidates<E: Evidence>(
     let time_step = time_step.unwrap_or_default();
     let believed = matches!(kind, Kind::Named | Kind::Class);
     let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
-    let on_confirm = |fit: &Hypothesis, step: &Step| held_out::residuals(bench, split, (fit, &step.weights));
+    let on_confirm = |fit: &Hypothesis, step: &Step| held_out::residuals(bench, split, fit, &step.weights);
     // What every step left on the confirm clips: the baseline is known, and others are what their candidates are measured from.
     let left: Vec<Option<Residuals>> = (found.steps.iter())
         .map(|step| if step.from.effects.is_empty() { Some(before.clone()) } else { on_confirm(&step.from, step) })
@@ -53,7 +53,7 @@ pub(super) fn candidates<E: Evidence>(
         let trial = step.trials.iter().find(|trial| trial.scored.candidate == effect).unwrap_or(trial);
         let with = match &trial.fitted {
             _ if kept => after_keeping(found, &left, after, place),
-            Some((fit, _)) => held_out::estimated(bench, split, (fit, &step.weights)),
+            Some((fit, _)) => held_out::estimated(bench, split, fit, &step.weights),
             None => None,
         };
         let closed = with.as_ref().zip(left[place].as_ref()).map(|(with, from)| with.shrink_added(from, before, seed));

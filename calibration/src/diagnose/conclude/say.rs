@@ -169,7 +169,7 @@ fn not_proven<'a, E: Evidence>(
     before: &Residuals,
 ) -> Option<(Unproven<'a>, f64)> {
     let open = unproven(case.bench, decided.found(case), case.admitted.cut())?;
-    let left = held_out::residuals(case.bench, case.split, (open.fit, &case.first().weights))?;
+    let left = held_out::residuals(case.bench, case.split, open.fit, &case.first().weights)?;
     let share = left.shrink(before, case.options.seed).value;
     (share > 0.0).then_some((open, share))
 }

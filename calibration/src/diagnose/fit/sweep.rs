@@ -120,12 +120,12 @@ fn batches(library: &Library, columns: &[Column], precision: Precision) -> Vec<B
         Column::Probe(candidate, alternative, _) => Some((candidate, alternative)),
     };
     for (k, column) in columns.iter().enumerate() {
-        let joint = joint_of(library, *column);
+        let joint = library.joints[number_of(library, *column)];
         let joins = (precision == Precision::Joints || library.joints_apart)
             && joint.is_some()
             && batches.last().is_some_and(|batch| {
                 batch.iter().all(|other| {
-                    let there = joint_of(library, columns[*other]);
+                    let there = library.joints[number_of(library, columns[*other])];
                     there.is_some() && there != joint && form(columns[*other]) == form(*column)
                 })
             });
@@ -137,12 +137,11 @@ fn batches(library: &Library, columns: &[Column], precision: Precision) -> Vec<B
     batches
 }
 
-fn joint_of(library: &Library, column: Column) -> Option<usize> {
+/// The number that a column moves first.
+fn number_of(library: &Library, column: Column) -> usize {
     match column {
-        Column::Number(k) => library.joints[k],
-        Column::Probe(candidate, a, p) => {
-            library.joints[library.candidates[candidate].alternatives[a].probes[p].moves[0].0]
-        }
+        Column::Number(k) => k,
+        Column::Probe(candidate, a, p) => library.candidates[candidate].alternatives[a].probes[p].moves[0].0,
     }
 }
 
@@ -193,7 +192,7 @@ impl<E: Likelihood, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
         }
         let (rows, channels) = (self.evidence.rows(clip), self.evidence.channels());
         let column = |(k, units): (&usize, &f64)| {
-            let joint = joint_of(self.library, self.columns[*k]).filter(|_| batch.len() > 1);
+            let joint = self.library.joints[number_of(self.library, self.columns[*k])].filter(|_| batch.len() > 1);
             let slope = |((out, base), row): ((&f64, &f64), &inference::likelihood::Row)| {
                 let channel = &channels[row.channel];
                 let foreign = joint.is_some_and(|joint| channel.joint != Some(joint));
@@ -211,13 +210,11 @@ impl<E: Likelihood, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
 
     /// What the columns of a batch can change; several joints at once are separated by the arm alone.
     fn reach(&self, batch: &[usize], numbers: &[f64]) -> Reach {
-        let number = |k: &usize| match self.columns[*k] {
-            Column::Number(k) => k,
-            Column::Probe(candidate, a, p) => self.library.candidates[candidate].alternatives[a].probes[p].moves[0].0,
-        };
         match batch {
             [_, _, ..] => Reach::Arm,
-            _ if !batch.iter().any(|k| self.library.arm_feels(number(k), numbers)) => Reach::Object,
+            _ if !batch.iter().any(|k| self.library.arm_feels(number_of(self.library, self.columns[*k]), numbers)) => {
+                Reach::Object
+            }
             _ => Reach::All,
         }
     }

@@ -16,7 +16,8 @@ pub(in crate::diagnose) type Fits = Vec<(Hypothesis, Vec<usize>)>;
 pub(in crate::diagnose) fn fits<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
-    (hypothesis, weights): (&Hypothesis, &[f64]),
+    hypothesis: &Hypothesis,
+    weights: &[f64],
 ) -> Option<Fits> {
     if split.in_turn.is_empty() {
         return Some(vec![(hypothesis.clone(), split.confirm.clone())]);
@@ -33,9 +34,10 @@ pub(in crate::diagnose) fn fits<E: Evidence>(
 pub(in crate::diagnose) fn residuals<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
-    hypothesis: (&Hypothesis, &[f64]),
+    hypothesis: &Hypothesis,
+    weights: &[f64],
 ) -> Option<Residuals> {
-    Residuals::of(bench, &fits(bench, split, hypothesis)?)
+    Residuals::of(bench, &fits(bench, split, hypothesis, weights)?)
 }
 
 /// The same for effects that are not named: where commands are left out in turn, its numbers are taken one Newton step away from
@@ -43,14 +45,15 @@ pub(in crate::diagnose) fn residuals<E: Evidence>(
 pub(in crate::diagnose) fn estimated<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
-    hypothesis: (&Hypothesis, &[f64]),
+    hypothesis: &Hypothesis,
+    weights: &[f64],
 ) -> Option<Residuals> {
     if split.in_turn.is_empty() {
-        return residuals(bench, split, hypothesis);
+        return residuals(bench, split, hypothesis, weights);
     }
     let without = |out: &Vec<usize>| {
-        let full = numbers_without(bench, hypothesis.0, out);
-        (Hypothesis { full, ..hypothesis.0.clone() }, out.clone())
+        let full = numbers_without(bench, hypothesis, out);
+        (Hypothesis { full, ..hypothesis.clone() }, out.clone())
     };
     Residuals::of(bench, &split.in_turn.iter().map(without).collect::<Vec<_>>())
 }
@@ -73,14 +76,14 @@ mod tests {
             let split = Split::new(&[vec![0], vec![1]], 0);
             assert_eq!(split.in_turn.len(), 2);
             let all = bench.fit(&[], truth(&library, &world), &split.train, even, None, ONCE).expect("a fit");
-            let fits = fits(bench, &split, (&all, even)).expect("two fits");
+            let fits = fits(bench, &split, &all, even).expect("two fits");
             for (fit, out) in &fits {
                 let seen: Vec<usize> = fit.fitted.iter().map(|clip| clip.clip).collect();
                 assert!(seen.len() == 1 && !out.contains(&seen[0]), "{seen:?} {out:?}");
             }
             let left = Residuals::of(bench, &fits).expect("residuals");
             assert_eq!(left.clips.iter().map(|(clip, _)| *clip).collect::<Vec<_>>(), [0, 1]);
-            let near = estimated(bench, &split, (&all, even)).expect("residuals");
+            let near = estimated(bench, &split, &all, even).expect("residuals");
             let at_all = Residuals::at(bench, &all, &[0, 1]).expect("residuals");
             let [fitted, near, at_all] = [&left, &near, &at_all].map(Residuals::mean_square);
             // One step goes most of the way that fits go.

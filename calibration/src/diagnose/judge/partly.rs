@@ -39,15 +39,16 @@ pub(in crate::diagnose) struct Partly {
 /// for confirming; `overdispersion`: see [`Found::overdispersion`].
 pub(in crate::diagnose) fn proven<E: Evidence>(
     bench: &Bench<'_, E>,
-    (split, found): (&Split, &Found),
+    split: &Split,
+    found: &Found,
     before: &Residuals,
     overdispersion: &[f64],
     seed: u64,
 ) -> Option<Partly> {
     let all = found.last.effects.len();
     let of_all = || {
-        let all = (&found.last, &found.steps.last()?.weights[..]);
-        Some(held_out::residuals(bench, split, all)?.shrink(before, seed))
+        let left = held_out::residuals(bench, split, &found.last, &found.steps.last()?.weights)?;
+        Some(left.shrink(before, seed))
     };
     let most_of = |share: &Share, all: Share| all.ci90[0] > MOST_OF_IT && share.value > MOST_OF_IT * all.value;
     let one = |count: usize| {
@@ -55,7 +56,7 @@ pub(in crate::diagnose) fn proven<E: Evidence>(
         let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
         let until = Found { steps: found.steps.clone(), last: last.clone() };
         let rivals = beside_what_stands_out(bench, &until, overdispersion)?;
-        let fits = held_out::fits(bench, split, (last, weights))?;
+        let fits = held_out::fits(bench, split, last, weights)?;
         let after = Residuals::of(bench, &fits)?;
         let share = after.shrink(before, seed);
         let unusual = !remainder::implausible(bench, last).is_empty();
@@ -165,7 +166,7 @@ mod tests {
             let split = Split { train: vec![0], confirm: vec![1], ..Split::default() };
             let before = Residuals::at(bench, &baseline, &split.confirm).expect("it can be simulated");
             let named = |found: &Found| {
-                let partly = proven(bench, (&split, found), &before, &vec![1.0; found.steps.len()], 0)?;
+                let partly = proven(bench, &split, found, &before, &vec![1.0; found.steps.len()], 0)?;
                 Some(Named { share: partly.share, effects: partly.effects(bench) })
             };
             tested(&library, &baseline, &last, &named);

@@ -7,7 +7,7 @@ use super::ends;
 use super::gap::Typical;
 use crate::answer::diagnosis::{SensorGap, Sensors};
 use crate::diagnose::criteria::{
-    DOUBTFUL, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, MOST_OF_IT, OBJECT_EXCESS,
+    DOUBTFUL_EXCESS, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, MOST_OF_IT, OBJECT_EXCESS,
     OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, TURNS_WITHIN, plain_excess,
 };
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
@@ -72,7 +72,7 @@ impl Left {
 
     /// How likely it is that nothing is there where no cause is seen.
     pub fn is_nothing(&self) -> f64 {
-        1.0 / (1.0 + ((self.gaps() - DOUBTFUL.value) / TURNS_WITHIN.value).exp())
+        1.0 / (1.0 + ((self.gaps() - DOUBTFUL_EXCESS.value) / TURNS_WITHIN.value).exp())
     }
 
     /// Whether something structured remains that is no numerics. `clear`: what was found stood out so much that it is

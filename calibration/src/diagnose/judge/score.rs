@@ -64,7 +64,7 @@ fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights:
         let shift = shift_to(bench, hypothesis, &(&total - form));
         let linear = value(form, &all, &shift) + clip.reduced.volume;
         let doubted = linear > clip.deviance() + ANOTHER_WAY_DEVIANCE;
-        let answer = if doubted { simulated(bench, hypothesis, (clip, &shift), weights) } else { None };
+        let answer = if doubted { simulated(bench, hypothesis, clip, &shift, weights) } else { None };
         (clip.clip, answer.unwrap_or(linear))
     };
     hypothesis.fitted.iter().map(one).collect()
@@ -74,7 +74,8 @@ fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights:
 fn simulated<E: Evidence>(
     bench: &Bench<'_, E>,
     hypothesis: &Hypothesis,
-    (clip, shift): (&FittedClip, &[f64]),
+    clip: &FittedClip,
+    shift: &[f64],
     weights: &[f64],
 ) -> Option<f64> {
     let mut shifted = hypothesis.clone();

@@ -51,8 +51,8 @@ impl Sizes {
     pub(in crate::diagnose) fn in_words(&self, of_object: bool) -> [String; 2] {
         let torques = self.torque_rms.as_ref().map(TorqueRms::over_joints).unwrap_or_default();
         [
-            size_in_words((torques.before, self.joints.before), self.add.before.filter(|_| of_object)),
-            size_in_words((torques.after, self.joints.after), self.add.after.filter(|_| of_object)),
+            size_in_words(torques.before, self.joints.before, self.add.before.filter(|_| of_object)),
+            size_in_words(torques.after, self.joints.after, self.add.after.filter(|_| of_object)),
         ]
     }
 
@@ -100,7 +100,7 @@ pub(in crate::diagnose) fn within_tolerance<E: Evidence>(
 }
 
 /// How large the gap is, in units of the hand: of the object where there is such a figure, else of the joints.
-fn size_in_words((torques, joints): (Option<f64>, Option<f64>), add: Option<f64>) -> String {
+fn size_in_words(torques: Option<f64>, joints: Option<f64>, add: Option<f64>) -> String {
     if let Some(torques) = torques {
         return format!("{} RMS over all joints", in_unit("N m", torques));
     }

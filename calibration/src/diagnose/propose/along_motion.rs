@@ -44,7 +44,7 @@ pub(in crate::diagnose) fn start<E: Likelihood>(at: &Around<'_, E>, candidate: &
         return None;
     }
     let with = |power: i32| {
-        let solved = joints.iter().filter_map(|joint| joint.solved(library, (&from.full, &moments), power));
+        let solved = joints.iter().filter_map(|joint| joint.solved(library, &from.full, &moments, power));
         let mut full = from.full.clone();
         solved.flatten().for_each(|(number, value)| full[number] = value);
         full
@@ -105,7 +105,7 @@ impl Joint {
             let (stiffness, damping) = (of(Setting::Stiffness(place))?, of(Setting::Damping(place))?);
             let of_joint = |k: &usize| library.joints[*k] == Some(place) && *k != stiffness && *k != damping;
             let sizes: Vec<usize> = candidate.sizes.iter().copied().filter(of_joint).collect();
-            let takes = sizes.iter().any(|size| is_dry_friction(library, candidate, (place, *size)));
+            let takes = sizes.iter().any(|size| is_dry_friction(library, candidate, place, *size));
             let taken = library.baseline.clone().filter(of_joint).chain(sizes).collect();
             (takes && !known(stiffness)).then_some(Self { place, stiffness, damping, taken })
         };
@@ -117,7 +117,7 @@ impl Joint {
     }
 
     /// The joint's numbers at one stiffness; `None` where it hardly moved.
-    fn solved(&self, library: &Library, (full, moments): (&[f64], &[Moment]), power: i32) -> Option<Vec<(usize, f64)>> {
+    fn solved(&self, library: &Library, full: &[f64], moments: &[Moment], power: i32) -> Option<Vec<(usize, f64)>> {
         let joint = self.place;
         let moving: Vec<&Moment> = moments.iter().filter(|moment| moment.state.dq[joint].abs() > MIN_SPEED).collect();
         if moving.len() < MIN_MOMENTS_PER_NUMBER * (1 + self.taken.len()) {
@@ -130,7 +130,7 @@ impl Joint {
         for _ in 0..2 {
             let asked = |moment: &&Moment| stiffness * moment.behind[joint] - damping * moment.state.dq[joint];
             let motor: Vec<f64> = moving.iter().map(asked).collect();
-            let (columns, others) = self.columns(library, full, (&moving, &motor))?;
+            let (columns, others) = self.columns(library, full, &moving, &motor)?;
             let wanted = moving.iter().map(|moment| stiffness * moment.behind[joint] - moment.load[joint]);
             found = robust(&columns, &(DVector::from_iterator(moving.len(), wanted) - others))?;
             damping = found[0].max(0.0);
@@ -149,7 +149,8 @@ impl Joint {
         &self,
         library: &Library,
         full: &[f64],
-        (moving, motor): (&[&Moment], &[f64]),
+        moving: &[&Moment],
+        motor: &[f64],
     ) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let mut resting = full.to_vec();
         self.taken.iter().for_each(|k| resting[*k] = library.unknowns[*k].start);
@@ -179,7 +180,7 @@ fn effects(library: &Library, full: &[f64]) -> Option<Effects> {
 }
 
 /// Whether a size of a candidate takes of a motor's torque what turns round with the motion and hardly depends on how fast it is.
-fn is_dry_friction(library: &Library, candidate: &Candidate, (joint, size): (usize, usize)) -> bool {
+fn is_dry_friction(library: &Library, candidate: &Candidate, joint: usize, size: usize) -> bool {
     let mut full = library.start();
     let strongest = candidate.strongest(size, library.unknowns[size].start);
     full[size] = strongest.unwrap_or(library.unknowns[size].start);

@@ -30,7 +30,8 @@ impl<E: Evidence> ArmAlone<'_, E> {
 pub(in crate::diagnose) fn fitted<E: Evidence>(
     search: &Search<'_, E>,
     step: &Step,
-    (places, overlooked): (&[usize], bool),
+    places: &[usize],
+    overlooked: bool,
     others: usize,
 ) -> Vec<(usize, Hypothesis)> {
     if places.is_empty() {
@@ -67,7 +68,7 @@ pub(in crate::diagnose) fn fitted<E: Evidence>(
         let candidate = step.trials[place].scored.candidate;
         let mut open = undetermined::sizes(&arm, &alone, candidate);
         open.retain(|k| bench.library.joints[*k].is_none());
-        Some((place, with_object(search, step, (&alone, &open), anew.as_deref())?))
+        Some((place, with_object(search, step, &alone, &open, anew.as_deref())?))
     };
     near.into_iter().enumerate().filter_map(looked_at).collect()
 }
@@ -77,7 +78,8 @@ pub(in crate::diagnose) fn fitted<E: Evidence>(
 fn with_object<E: Evidence>(
     search: &Search<'_, E>,
     step: &Step,
-    (alone, open): (&Hypothesis<WithoutOwn>, &[usize]),
+    alone: &Hypothesis<WithoutOwn>,
+    open: &[usize],
     anew: Option<&[f64]>,
 ) -> Option<Hypothesis> {
     let bench = search.bench;
@@ -207,7 +209,7 @@ mod tests {
                 step.left = vec![group(false, arm), group(true, 100.0)];
                 step.whole = step.left.clone();
                 let search = Search { bench, split: &split, refined: &anew, bar: &Progress::new("nothing", 1) };
-                object(super::fitted(&search, &step, (&[0], false), 0))
+                object(super::fitted(&search, &step, &[0], false, 0))
             };
             assert_eq!(fitted(1.5), library.with_object_of(hidden.clone(), &wrong), "the arm is where it was");
             assert_eq!(fitted(50.0), hidden);
@@ -225,7 +227,7 @@ mod tests {
             let (step, split) = step(bench, hidden_baseline(library, &world), even, &asked);
             let bar = &Progress::new("nothing", 1);
             let search = Search { bench, split: &split, refined: &|_| None, bar };
-            let found = fitted(&search, &step, (&[0, 1], false), 0);
+            let found = fitted(&search, &step, &[0, 1], false, 0);
             let [(1, fit)] = &found[..] else { panic!("{} fits", found.len()) };
             let sizes = &library.candidates[asked[1]].sizes;
             let [turned, lifted] = [0, 1].map(|joint| (fit.full[sizes[joint]], hidden[sizes[joint]].expect("hidden")));
@@ -245,7 +247,7 @@ mod tests {
             let (step, split) = step(bench, hidden_baseline(library, &world), even, &[candidate]);
             let bar = &Progress::new("nothing", 1);
             let search = Search { bench, split: &split, refined: &|_| None, bar };
-            let found = fitted(&search, &step, (&[0], true), 0);
+            let found = fitted(&search, &step, &[0], true, 0);
             let [(0, fit)] = &found[..] else { panic!("{} fits", found.len()) };
             assert_eq!(fit.effects, [candidate]);
             assert!(fit.deviance() < step.from.deviance(), "{} {}", fit.deviance(), step.from.deviance());

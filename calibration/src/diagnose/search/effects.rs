@@ -182,7 +182,7 @@ fn fitted<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: &[usize], ove
         trial.own_numbers && bench.library.candidates[trial.scored.candidate].is_of_arm()
     };
     let (of_arm, others): (Vec<usize>, Vec<usize>) = asked.partition(on_arm);
-    let mut fits = arm_alone::fitted(search, &step, (&of_arm, overlooked), others.len());
+    let mut fits = arm_alone::fitted(search, &step, &of_arm, overlooked, others.len());
     let before = fits.len();
     for (done, place) in others.into_iter().enumerate() {
         if bench.interrupt.asked() {
