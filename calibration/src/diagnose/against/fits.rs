@@ -4,12 +4,12 @@ use super::turned::{Model, SIDES, Side, TwoSessions, side_of};
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
+use crate::diagnose::fit::multi_start::Fit;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out;
 use crate::diagnose::judge::score::{Predicted, predict};
 use crate::diagnose::select::criteria::CHANGES;
 use crate::diagnose::select::gain::Gain;
-use crate::diagnose::select::multi_start::Fit;
 use inference::admit::Split;
 use inference::likelihood::Evidence;
 

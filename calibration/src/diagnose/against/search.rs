@@ -6,12 +6,12 @@ use super::subjects::Subject;
 use super::turned::Model;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{REFINEMENT, SCREENING};
+use crate::diagnose::fit::multi_start::{Fit as _, cheapest};
 use crate::diagnose::fit::stages;
 use crate::diagnose::search::refit::last_pass;
 use crate::diagnose::select::criteria::CHANGES;
 use crate::diagnose::select::forward::{Selection, backward, forward};
 use crate::diagnose::select::gain::Gain;
-use crate::diagnose::select::multi_start::{Fit, cheapest};
 use inference::likelihood::Evidence;
 use shared_mem::progress::Progress;
 
@@ -181,8 +181,13 @@ impl<E: Evidence> Changes<'_, E> {
     /// A fit from the first of several starts from which it comes to more than the model `near` it.
     fn fit_from(&self, starts: impl IntoIterator<Item = Model>, near: &Fitted) -> Option<Fitted> {
         let fit = |model, near: &Fitted, effort| self.pair_bench.fit(model, &self.weights, Some(near), effort);
-        let begun = starts.into_iter().filter_map(|start| fit(start, near, SCREENING));
-        let best = cheapest(begun, near.cost())?;
+        let mut best: Option<Fitted> = None;
+        for start in starts {
+            if best.as_ref().is_none_or(|best| best.cost() >= near.cost()) {
+                best = cheapest(best.into_iter().chain(fit(start, near, SCREENING)));
+            }
+        }
+        let best = best?;
         fit(best.model.clone(), &best, REFINEMENT)
     }
 

@@ -2,6 +2,7 @@
 //! `descend`.
 
 use super::effort::{Effort, PROBE};
+use super::multi_start::Tried;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
 use crate::diagnose::library::Library;
@@ -205,10 +206,10 @@ impl<E: Likelihood> Bench<'_, E> {
         full: Vec<f64>,
         moving: &[usize],
         weights: &[f64],
-    ) -> Option<(f64, Vec<f64>)> {
+    ) -> Option<Tried> {
         let clips = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
         let (Reached { full, clips, .. }, _) = self.descended(full, clips, moving, weights, PROBE)?;
-        Some((self.cost(&full, &clips, weights)?, full))
+        Some(Tried { cost: self.cost(&full, &clips, weights)?, numbers: full })
     }
 
     pub(in crate::diagnose) fn linearise(

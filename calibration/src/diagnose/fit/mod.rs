@@ -8,6 +8,7 @@
 //! | `anchored` | strokes of another program around one point, with the twin's differences |
 //! | `bench`, `cost`, `effort` | hypotheses fitted, what they cost, and how much work a fit gets |
 //! | `descend` | the steps of a fit |
+//! | `multi_start` | one fit from several starts |
 //! | `left_out` | the numbers without some of the clips |
 //! | `restart` | restarts of clips whose nuisance parameters are stuck in a local minimum |
 //! | `parameters`, `undetermined` | its numbers with their intervals, and those that nothing depends on |
@@ -21,6 +22,7 @@ mod descend;
 pub mod effort;
 pub mod floor;
 pub(super) mod left_out;
+pub mod multi_start;
 pub mod parameters;
 pub mod restart;
 pub mod shortlist;

@@ -6,6 +6,7 @@
 
 use super::bench::{Bench, Clips};
 use super::effort::ANOTHER_WAY_DEVIANCE;
+use super::multi_start::{Tried, cheapest};
 use super::sweep::Precision;
 use inference::likelihood::Likelihood;
 use inference::statistics::median;
@@ -27,10 +28,10 @@ impl<E: Likelihood> Bench<'_, E> {
         }
         let Some(costs) = self.costs(full, &clips, weights) else { return clips };
         for place in outstanding(&costs) {
-            let Some((cost, own)) = self.elsewhere(full, clips[place].0, weights) else { continue };
-            if cost < costs[place] {
+            let elsewhere = self.elsewhere(full, clips[place].0, weights).filter(|tried| tried.cost < costs[place]);
+            if let Some(Tried { cost, numbers }) = elsewhere {
                 tracing::debug!("clip {} costs {cost:.0} elsewhere instead of {:.0}", clips[place].0, costs[place]);
-                clips[place].1 = own;
+                clips[place].1 = numbers;
             }
         }
         clips
@@ -38,7 +39,7 @@ impl<E: Likelihood> Bench<'_, E> {
 
     /// What a clip costs where it costs least some way along its nuisance parameters, and these. What has heavy tails follows by one
     /// step: it acts evenly.
-    fn elsewhere(&self, full: &[f64], clip: usize, weights: &[f64]) -> Option<(f64, Vec<f64>)> {
+    fn elsewhere(&self, full: &[f64], clip: usize, weights: &[f64]) -> Option<Tried> {
         let even = &self.scatter.heavy;
         let numbers = (0..self.scatter.count()).filter(|number| !even.contains(number));
         let begun = numbers.flat_map(|number| {
@@ -60,7 +61,7 @@ impl<E: Likelihood> Bench<'_, E> {
             }));
         }
         let costs = self.costs(full, &tried, weights)?;
-        costs.into_iter().zip(tried).map(|(cost, (_, own))| (cost, own)).min_by(|a, b| a.0.total_cmp(&b.0))
+        cheapest(costs.into_iter().zip(tried).map(|(cost, (_, numbers))| Tried { cost, numbers }))
     }
 }
 

@@ -16,9 +16,9 @@ pub mod starts;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
+use crate::diagnose::fit::multi_start::{MultiStart, Tried};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
-use crate::diagnose::select::multi_start::MultiStart;
 use inference::admit::Split;
 use inference::likelihood::{Evidence, Likelihood};
 use shared_mem::progress::Progress;
@@ -92,15 +92,15 @@ impl<E: Likelihood> Around<'_, E> {
 
     /// Which numbers make the clips cost least, and how much, where that is less than `bound`. Of numbers that cost more
     /// before all clips were asked the others are not.
-    fn cheapest(&self, numbers: impl IntoIterator<Item = Vec<f64>>, bound: f64) -> Option<(f64, Vec<f64>)> {
-        let (clips, mut best) = (self.from.clips(), None::<(f64, Vec<f64>)>);
-        for full in numbers {
+    fn cheapest(&self, numbers: impl IntoIterator<Item = Vec<f64>>, bound: f64) -> Option<Tried> {
+        let (clips, mut best) = (self.from.clips(), None::<Tried>);
+        for numbers in numbers {
             if self.bench.interrupt.asked() {
                 break;
             }
-            let bound = best.as_ref().map_or(bound, |(cost, _)| *cost);
-            if let Some(cost) = self.bench.plain_cost_below(&clips, &full, self.weights, bound) {
-                best = Some((cost, full));
+            let bound = best.as_ref().map_or(bound, |best| best.cost);
+            if let Some(cost) = self.bench.plain_cost_below(&clips, &numbers, self.weights, bound) {
+                best = Some(Tried { cost, numbers });
             }
         }
         best

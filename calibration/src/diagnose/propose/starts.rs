@@ -1,8 +1,9 @@
 //! Where fits of a candidate begin. Effects on the arm are smooth, so the slope at the neutral point shows the way. What has no slope
 //! there, and what changes how an object is hit or slides, is tried at strengths that are plausible; what does nothing below a threshold,
-//! joint by joint. All of these are starts of one fit ([`crate::diagnose::select::multi_start`]).
+//! joint by joint. All of these are starts of one fit ([`crate::diagnose::fit::multi_start`]).
 
 use super::{Around, along_motion, ripple};
+use crate::diagnose::fit::multi_start::{Tried, cheapest};
 use crate::diagnose::fit::shortlist::{MAX_FORMS, Scored};
 use crate::diagnose::library::Candidate;
 use inference::likelihood::{Likelihood, Setting};
@@ -81,7 +82,7 @@ pub(in crate::diagnose) fn has_places(candidate: &Candidate) -> bool {
 /// elsewhere than it is shows no slope towards its place.
 fn placed<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64>> {
     let friction = at.bench.library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
-    let mut places: Vec<(f64, Vec<f64>)> = Vec::new();
+    let mut places: Vec<Tried> = Vec::new();
     for form in in_each_form(at.candidate(scored), scored) {
         let numbers = aside(at.candidate(scored), &form, &IN_EACH_PLACE).into_iter().flat_map(|start| {
             FRICTION_BESIDE.map(|share| {
@@ -91,11 +92,11 @@ fn placed<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64>> {
             })
         });
         // A place that costs more than those that are fitted anyway is not fitted.
-        let bound = places.get(MAX_FORMS - 1).map_or(f64::INFINITY, |(cost, _)| *cost);
+        let bound = places.get(MAX_FORMS - 1).map_or(f64::INFINITY, |place| place.cost);
         places.extend(at.cheapest(numbers, bound));
-        places.sort_by(|a, b| a.0.total_cmp(&b.0));
+        places.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     }
-    places.into_iter().take(MAX_FORMS).map(|(_, full)| full).collect()
+    places.into_iter().take(MAX_FORMS).map(|place| place.numbers).collect()
 }
 
 /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least, in any form, unless
@@ -107,7 +108,7 @@ fn scanned<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64>> 
     let in_step = if ripples { ripple::start(at, scored.candidate) } else { None };
     let numbers = starts.map(|start| at.begun(&start)).chain(in_step);
     let start = at.cheapest(numbers, MAX_TIMES_COST * at.cost(&at.from.full));
-    start.map(|(_, full)| full).into_iter().chain(without_a_slope(at, candidate)).collect()
+    start.map(|start| start.numbers).into_iter().chain(without_a_slope(at, candidate)).collect()
 }
 
 /// Numbers of an effect to which no slope leads, joint by joint.
@@ -128,8 +129,8 @@ fn limits<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate, mut full: Ve
     let mut cost = at.cost(&full);
     for _ in &candidate.sizes {
         let numbers = moves.iter().flat_map(|one| LIMIT_UNITS.map(|units| at.moved(&full, *one, units)));
-        let Some((less, better)) = at.cheapest(numbers.collect::<Vec<_>>(), MAX_COST_LEFT * cost) else { break };
-        (cost, full) = (less, better);
+        let Some(better) = at.cheapest(numbers.collect::<Vec<_>>(), MAX_COST_LEFT * cost) else { break };
+        (cost, full) = (better.cost, better.numbers);
     }
     full
 }
@@ -150,9 +151,8 @@ fn joint_by_joint<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate) -> V
         let tried = IN_EACH_JOINT.iter().filter_map(|share| {
             at.bench.after_a_step(at.from, at.moved(&full, one, share * probe.largest), &chosen, at.weights)
         });
-        let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
         let now = at.cost(&full);
-        full = best.filter(|(cost, _)| *cost < now).map_or(full, |(_, better)| better);
+        full = cheapest(tried).filter(|best| best.cost < now).map_or(full, |better| better.numbers);
         if at.bench.interrupt.asked() {
             break;
         }
@@ -186,7 +186,7 @@ fn each_direction<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Option<
     let of_object = |k| !library.arm_feels(k, &at.from.full) && library.settings.settings()[k] != Setting::Friction;
     let bases = [at.from.full.clone(), with_nominal(at, of_object)];
     let numbers = starts.iter().flat_map(|start| bases.iter().map(|base| at.bench.begun(base.clone(), start)));
-    at.cheapest(numbers, f64::INFINITY).map(|(_, full)| full)
+    at.cheapest(numbers, f64::INFINITY).map(|best| best.numbers)
 }
 
 /// Numbers of an effect in the joints that the arm's own channels leave open, where the object tells them: nothing but what
@@ -200,7 +200,7 @@ pub(in crate::diagnose) fn seen_by_the_object<E: Likelihood>(
     let moves: Vec<_> = at.bench.library.candidates.iter().flat_map(first_moves).collect();
     for one in moves.into_iter().filter(|(number, _)| open.contains(number)) {
         let tried = WHOLE_RANGE_UNITS.map(|units| at.moved(&full, one, units));
-        full = at.cheapest(tried, f64::INFINITY).map_or(full, |(_, full)| full);
+        full = at.cheapest(tried, f64::INFINITY).map_or(full, |best| best.numbers);
     }
     full
 }

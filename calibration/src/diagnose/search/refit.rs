@@ -2,12 +2,12 @@
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{Effort, LAST_PASS, REFINEMENT};
+use crate::diagnose::fit::multi_start::cheapest;
 use crate::diagnose::judge::score::predict;
 use crate::diagnose::library::Alternative;
 use crate::diagnose::propose::Search;
 use crate::diagnose::propose::arm_alone::ArmAlone;
 use crate::diagnose::select::criteria::EFFECTS;
-use crate::diagnose::select::multi_start::{NEVER_ENOUGH, cheapest};
 use inference::likelihood::Evidence;
 
 /// Where in its range a held form is tried, and how often the best of these is then looked for halfway to its neighbours (choices).
@@ -22,7 +22,7 @@ pub(super) fn refitted<E: Evidence>(search: &Search<'_, E>, fit: &Hypothesis, we
     let anew = ways.iter().flatten().filter_map(|full| (search.refined)(full));
     let best = fits.best(anew.chain([fit.full.clone()]), last_pass(bench))?;
     let scanned = scanned(bench, &best, weights).and_then(|full| fits.fit(full, last_pass(bench)));
-    cheapest([Some(best), scanned].into_iter().flatten(), NEVER_ENOUGH)
+    cheapest([Some(best), scanned].into_iter().flatten())
 }
 
 /// The numbers of a fit whose last effect is one of the arm, with what is held of it where the arm's channels cost least, the

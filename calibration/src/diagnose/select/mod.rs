@@ -2,7 +2,6 @@
 //!
 //! | module | |
 //! |---|---|
-//! | `multi_start` | one fit from several starts |
 //! | `gain` | what one model is worth over another: log-likelihood of clips left out |
 //! | `criteria` | when that is enough, and which extensions are fitted |
 //! | `forward` | extensions taken on while one is worth it, and dropped where others do without |
@@ -10,4 +9,3 @@
 pub mod criteria;
 pub mod forward;
 pub mod gain;
-pub mod multi_start;

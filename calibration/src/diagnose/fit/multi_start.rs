@@ -1,11 +1,11 @@
 //! One fit from several starts: a local solver finds the nearest minimum, and over hits, sticking joints and limits there are many. What
-//! differs from effect to effect is where its fits begin, and that is data.
+//! differs from effect to effect, and from clip to clip, is where its fits begin, and that is data.
 
-use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::effort::Effort;
+use super::bench::{Bench, Hypothesis};
+use super::effort::Effort;
 use inference::likelihood::Likelihood;
 
-/// A fit with its cost.
+/// What was fitted or tried, with its cost.
 pub trait Fit {
     /// `-2 ln` of the likelihood.
     fn cost(&self) -> f64;
@@ -17,22 +17,23 @@ impl<V> Fit for Hypothesis<V> {
     }
 }
 
-/// The cheapest of some fits; the first that costs less than is `enough` ends the search for it.
-pub fn cheapest<F: Fit>(fits: impl IntoIterator<Item = F>, enough: f64) -> Option<F> {
-    let mut best: Option<F> = None;
-    for fit in fits {
-        if best.as_ref().is_none_or(|best| fit.cost() < best.cost()) {
-            best = Some(fit);
-        }
-        if best.as_ref().is_some_and(|best| best.cost() < enough) {
-            break;
-        }
-    }
-    best
+/// Numbers, and what clips cost there.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) struct Tried {
+    pub(in crate::diagnose) cost: f64,
+    pub(in crate::diagnose) numbers: Vec<f64>,
 }
 
-/// Whatever it costs.
-pub const NEVER_ENOUGH: f64 = f64::NEG_INFINITY;
+impl Fit for Tried {
+    fn cost(&self) -> f64 {
+        self.cost
+    }
+}
+
+/// The cheapest, and of several the first.
+pub fn cheapest<F: Fit>(fits: impl IntoIterator<Item = F>) -> Option<F> {
+    fits.into_iter().min_by(|a, b| a.cost().total_cmp(&b.cost()))
+}
 
 /// Effects that are fitted together to the same clips, from wherever.
 pub struct MultiStart<'a, E: Likelihood> {
@@ -52,7 +53,7 @@ impl<E: Likelihood> MultiStart<'_, E> {
 
     /// The cheapest of fits from several starts.
     pub fn best(&self, starts: impl IntoIterator<Item = Vec<f64>>, effort: Effort) -> Option<Hypothesis<E::Own>> {
-        cheapest(starts.into_iter().filter_map(|full| self.fit(full, effort)), NEVER_ENOUGH)
+        cheapest(starts.into_iter().filter_map(|full| self.fit(full, effort)))
     }
 
     /// Fits from several starts, `count` of the cheapest fitted further, and the cheapest of these.
@@ -66,7 +67,7 @@ impl<E: Likelihood> MultiStart<'_, E> {
         let mut begun: Vec<_> = starts.into_iter().filter_map(|full| self.fit(full, effort)).collect();
         begun.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
         let onwards = |fit: &Hypothesis<E::Own>| MultiStart { near: Some(fit), ..*self }.fit(fit.full.clone(), further);
-        cheapest(begun.iter().take(count).filter_map(onwards), NEVER_ENOUGH)
+        cheapest(begun.iter().take(count).filter_map(onwards))
     }
 }
 
@@ -81,11 +82,10 @@ mod tests {
     }
 
     #[test]
-    fn the_cheapest_fit_counts_and_none_is_made_after_one_that_is_enough() {
-        assert_eq!(cheapest([3.0, 1.0, 2.0], NEVER_ENOUGH), Some(1.0));
-        let made = std::cell::Cell::new(0);
-        let fits = [5.0, 3.0, 1.0].into_iter().inspect(|_| made.set(made.get() + 1));
-        assert_eq!((cheapest(fits, 4.0), made.get()), (Some(3.0), 2));
-        assert_eq!(cheapest([], NEVER_ENOUGH), None::<f64>);
+    fn the_cheapest_fit_counts_and_of_several_the_first() {
+        assert_eq!(cheapest([3.0, 1.0, 2.0]), Some(1.0));
+        let tried = |numbers| Tried { cost: 1.0, numbers: vec![numbers] };
+        assert_eq!(cheapest([tried(4.0), tried(5.0)]).map(|tried| tried.numbers), Some(vec![4.0]));
+        assert_eq!(cheapest([]), None::<f64>);
     }
 }
