@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A kill that nobody can listen to loses no more work than this.
+/// A kill that nobody can listen to loses no more work than this (a choice).
 const SAVED_EVERY: Duration = Duration::from_secs(30);
 
 /// Results of steps, and the file in which they outlive the program.

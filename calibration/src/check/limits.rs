@@ -8,7 +8,7 @@ pub(super) const LEAST_MISMATCH: f64 = 5e-3;
 /// differ by more than a fifth of what separates either from a third.
 pub(super) const BETTER_FIT: f64 = 0.2;
 
-pub(super) use inference::likelihood::arm::velocity::{LEAST_MOTION, MOVES, NOT_ITS_SLOPE};
+pub(super) use inference::likelihood::arm::velocity::{LEAST_MOTION, MOTION_OVER_NOISE, NOT_ITS_SLOPE};
 
 /// A ratio of two quantities is a known conversion when it comes this near to it [1]: half-way between 57.3 and the next
 /// conversion (60) is 2.3 %; the controller adds errors of some percent, and no other conversion is near any of these.

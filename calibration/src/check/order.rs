@@ -3,7 +3,7 @@
 
 use super::columns::Columns;
 use super::lag::Lag;
-use super::limits::{BETTER_FIT, LEAST_MISMATCH, MOVES};
+use super::limits::{BETTER_FIT, LEAST_MISMATCH, MOTION_OVER_NOISE};
 use super::remark::{Fault, Remark, Size};
 
 /// Times at which positions are compared.
@@ -47,7 +47,7 @@ pub(super) fn remarks(clip: &Columns, lag: Option<&Lag>) -> Vec<Remark> {
         return Vec::new();
     };
     let dof = plain.len();
-    let suspect = |i: &usize| plain[*i][*i] > LEAST_MISMATCH.max(MOVES * clip.measured.noise[*i]);
+    let suspect = |i: &usize| plain[*i][*i] > LEAST_MISMATCH.max(MOTION_OVER_NOISE * clip.measured.noise[*i]);
     let mut out = Vec::new();
     let mut others = Vec::new();
     for i in (0..dof).filter(suspect) {

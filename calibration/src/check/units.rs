@@ -3,7 +3,7 @@
 
 use super::columns::{Columns, Signals};
 use super::conversion;
-use super::limits::{MOVES, NEAR_CONVERSION};
+use super::limits::{MOTION_OVER_NOISE, NEAR_CONVERSION};
 use super::range;
 use super::remark::{Fault, Remark, Size};
 use super::statistics::{deviation, mean, range, root_mean_square};
@@ -39,7 +39,7 @@ pub(super) fn converted(clip: &Columns, arm: Option<&ArmModel>) -> Option<Conver
         return None;
     }
     let ratios: Vec<f64> = (0..measured.dof())
-        .filter(|j| deviation(&desired.q[*j]) > MOVES * desired.noise[*j].max(1e-9))
+        .filter(|j| deviation(&desired.q[*j]) > MOTION_OVER_NOISE * desired.noise[*j].max(1e-9))
         .map(|j| deviation(&measured.q[j]) / deviation(&desired.q[j]))
         .collect();
     let (side, why) = side(clip, factor, arm);
@@ -73,7 +73,7 @@ pub(super) fn converted(clip: &Columns, arm: Option<&ArmModel>) -> Option<Conver
 }
 
 fn moves(signals: &Signals) -> bool {
-    signals.q.iter().zip(&signals.noise).any(|(q, noise)| deviation(q) > MOVES * noise.max(1e-9))
+    signals.q.iter().zip(&signals.noise).any(|(q, noise)| deviation(q) > MOTION_OVER_NOISE * noise.max(1e-9))
 }
 
 /// How far all joints together move about their means.

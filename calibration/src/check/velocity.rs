@@ -2,7 +2,7 @@
 //!
 use super::columns::{Columns, Signals};
 use super::conversion;
-use super::limits::{MOVES, NEAR_TURN, NOT_ITS_SLOPE};
+use super::limits::{MOTION_OVER_NOISE, NEAR_TURN, NOT_ITS_SLOPE};
 use super::remark::{Fault, Remark, Severity, Size};
 use super::statistics::{median, quantile, range};
 use inference::likelihood::arm::velocity::{Compared, Motion, late};
@@ -94,7 +94,7 @@ fn wraps(clip: &Columns, topic: &str, signals: &Signals) -> Option<Remark> {
         let turns = |i: &usize| off(i).abs() * (t[*i] - t[i - 1]) / TAU;
         rows.extend(
             (1..t.len().saturating_sub(1))
-                .filter(|i| off(i).abs() > MOVES * usual && (turns(i) - 1.0).abs() < NEAR_TURN)
+                .filter(|i| off(i).abs() > MOTION_OVER_NOISE * usual && (turns(i) - 1.0).abs() < NEAR_TURN)
                 .map(|i| (i, joint)),
         );
     }

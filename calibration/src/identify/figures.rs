@@ -4,9 +4,9 @@ use crate::answer::identification::{ClipGap, Figures, Gap};
 use inference::statistics::median;
 
 /// Use of a clip that was fitted.
-pub(super) const FITTED: &str = "fitted";
+pub(super) const USE_FITTED: &str = "fitted";
 /// Use of a clip that was not.
-pub(super) const HELD_OUT: &str = "held out";
+pub(super) const USE_HELD_OUT: &str = "held out";
 
 /// Means over the clips of each use.
 pub(super) fn gap(clips: &[ClipGap]) -> Gap {
@@ -14,10 +14,10 @@ pub(super) fn gap(clips: &[ClipGap]) -> Gap {
         Figures::mean(&clips.iter().filter(|clip| clip.used == used).map(of).collect::<Vec<_>>())
     };
     Gap {
-        train: mean(FITTED, |clip| clip.after),
-        holdout: mean(HELD_OUT, |clip| clip.after),
-        train_before: mean(FITTED, |clip| clip.before),
-        holdout_before: mean(HELD_OUT, |clip| clip.before),
+        train: mean(USE_FITTED, |clip| clip.after),
+        holdout: mean(USE_HELD_OUT, |clip| clip.after),
+        train_before: mean(USE_FITTED, |clip| clip.before),
+        holdout_before: mean(USE_HELD_OUT, |clip| clip.before),
     }
 }
 
@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn means_are_over_the_clips_of_one_use_whatever_their_order() {
-        let mut clips = vec![clip(FITTED, 0.3), clip(HELD_OUT, 0.1), clip(FITTED, 0.4)];
+        let mut clips = vec![clip(USE_FITTED, 0.3), clip(USE_HELD_OUT, 0.1), clip(USE_FITTED, 0.4)];
         let first = gap(&clips);
         assert!((first.train.joint_rms_rad.expect("fitted") - 0.125_f64.sqrt()).abs() < 1e-12);
         assert_eq!((first.holdout.joint_rms_rad, first.holdout_before.joint_rms_rad), (Some(0.1), Some(0.2)));
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn a_clip_unlike_the_others_is_odd_and_of_two_none_is() {
-        let clips: Vec<ClipGap> = [0.01, 0.012, 0.09, 0.011].map(|rad| clip(FITTED, rad)).into();
+        let clips: Vec<ClipGap> = [0.01, 0.012, 0.09, 0.011].map(|rad| clip(USE_FITTED, rad)).into();
         let error = |clip: &ClipGap| clip.after.joint_rms_rad.unwrap_or_default();
         let files =
             |times, least| odd(&clips, error, times, least).iter().map(|odd| odd.clip.file.clone()).collect::<Vec<_>>();

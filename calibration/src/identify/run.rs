@@ -41,9 +41,9 @@ impl Optimizer {
     }
 }
 
-/// Most steps with some of the clips, before all are fitted.
-const FIRST: usize = 3;
-/// Linearisations that a fit usually takes: for the bar alone.
+/// Most steps with some of the clips, before all are fitted (a choice).
+const STEPS_OF_THE_ROUGH_FIT: usize = 3;
+/// Linearisations that a fit usually takes (a choice): for the bar alone.
 const USUAL_LINEARISATIONS: usize = 4;
 
 /// What a search is given.
@@ -111,7 +111,7 @@ impl Run<'_> {
             None => {
                 let start = if first.clips() < model.clips() {
                     let few = Watched { model: first, watch };
-                    let (from, schedule) = (at_rest(start, first.clips()), Schedule::of(FIRST));
+                    let (from, schedule) = (at_rest(start, first.clips()), Schedule::of(STEPS_OF_THE_ROUGH_FIT));
                     fit_from(&few, self.unknowns, self.random, from, &schedule, |_, _| !self.interrupt.asked())?.shared
                 } else {
                     start

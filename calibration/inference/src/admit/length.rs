@@ -9,9 +9,9 @@ use shared_mem::recording::{Clip, JointSeries};
 /// hundred that say something of their own in every channel, more than the numbers of any hypothesis; it is three times what the
 /// simulated sessions have in which effects are separated (34 s).
 const ENOUGH_MOTION: f64 = 96.0;
-/// Commands from before the part that counts are kept for so long: some are still on their way [ns].
+/// Commands from before the part that counts are kept for so long [ns] (a choice): some are still on their way.
 const COMMANDS_BEFORE_NS: u64 = 500_000_000;
-/// Parts of a clip that are compared begin this share of their length apart.
+/// Parts of a clip that are compared begin this share of their length apart (a choice).
 const PARTS_APART: f64 = 0.05;
 
 /// Cuts the longest clips of arms alone to one length, so that 96 s are left: of each the part in which its commands move

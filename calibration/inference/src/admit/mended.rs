@@ -7,11 +7,13 @@ use shared_mem::frames::Pose;
 use shared_mem::recording::{Clip, ObjectSeries};
 use twin::scene::{ObjectModel, ObjectShape};
 
-/// A pose this far from the middle of its neighbours, and they nearer to each other, is the tracker's mistake [m].
+/// A pose this far from the middle of its neighbours, and they nearer to each other, is the tracker's mistake [m] (a choice: a slide of 3
+/// m/s that stops within a frame of 60 Hz leaves less).
 const JUMP_BESIDE_NEIGHBOURS: f64 = 0.04;
-/// Turns by nearly half about an axis from one pose to the next are a box taken for itself turned over [rad].
+/// Turns by more about an axis from one pose to the next are a box taken for itself turned over [rad] (a choice: pi less what noise
+/// turns).
 const HALF_TURN: f64 = 2.6;
-/// A pose that is repeated more often than this was not measured anew: no filter holds a noisy pose for so long [1].
+/// A pose that is repeated more often than this was not measured anew: no filter holds a noisy pose for so long [1] (a choice).
 const REPEATS_OF_A_LOST_OBJECT: usize = 5;
 
 /// Poses that are the tracker's mistakes left out, a symmetric box turned back.

@@ -10,22 +10,22 @@ use shared_mem::recording::{Clip, ObjectSeries};
 use twin::replay::{Buried, object_start};
 use twin::scene::{ObjectModel, ObjectShape};
 
-/// An object that moves this much farther from one pose to the next than before or after was lost [m]: a hit makes it
-/// fast at once, but friction does not stop it at once.
+/// An object that moves this much farther from one pose to the next than before or after was lost [m] (a choice): a hit makes it fast at
+/// once, but friction does not stop it at once.
 const LOST_STEP: f64 = 0.03;
-/// No table reaches so far [m].
+/// No table reaches so far [m] (a choice): poses in millimetres do.
 const FARTHEST_TABLE: f64 = 20.0;
-/// Share of poses that may be mistakes.
+/// Share of poses that may be missing (a choice).
 const MAX_SHARE_OF_MISTAKES: f64 = 0.1;
-/// Longest time without a pose while the object moves [s].
+/// Longest time without a pose while the object moves [s] (a choice).
 const LONGEST_GAP: f64 = 0.2;
-/// An object leans no further while it slides [rad].
+/// An object leans no further while it slides [rad] (a choice: 20 degrees).
 const TOPPLED_LEAN: f64 = 0.35;
-/// An object that went no farther was not hit [m].
+/// An object that went no farther was not hit [m] (a choice: five times a tracker's noise).
 const LEAST_TRAVEL_OF_A_HIT: f64 = 5e-3;
-/// A tool that came no nearer while the object moved does not push it: the poses are in another frame [m].
+/// A tool that came no nearer while the object moved does not push it: the poses are in another frame [m] (a choice).
 const TOOL_ELSEWHERE: f64 = 0.03;
-/// A box leans no further where it stands [rad].
+/// A box leans no further where it stands [rad] (a choice: what a tracker's error and a tilted table turn it).
 const LEAN_BEFORE_THE_HIT: f64 = 0.2;
 
 /// A clip whose poses were looked at.

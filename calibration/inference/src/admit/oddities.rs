@@ -3,9 +3,9 @@
 use crate::statistics::median;
 use shared_mem::recording::ObjectSeries;
 
-/// Fewest poses a second that show a slide.
+/// Fewest poses a second that show a slide [Hz] (a choice).
 const SLOWEST_TRACKER: f64 = 20.0;
-/// Poses over which the last speed is taken [1], and a speed at which an object has not come to rest [m/s].
+/// Poses over which the last speed is taken [1], and a speed at which an object has not come to rest [m/s] (choices).
 const LAST_POSES: usize = 4;
 const STILL_MOVING: f64 = 0.05;
 

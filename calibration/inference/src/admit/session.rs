@@ -118,7 +118,7 @@ pub enum Refused {
     NotTestable(String),
 }
 
-/// Fewer commands than this cannot be split into clips for fitting, choosing and confirming.
+/// Fewer commands than this cannot be split into clips for fitting, choosing and confirming: two to fit and one for each of the others.
 const FEWEST_COMMANDS: usize = 4;
 
 /// Reads a session's clips for a diagnosis.

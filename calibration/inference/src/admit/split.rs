@@ -17,7 +17,7 @@ pub struct Split {
     pub in_turn: Vec<Vec<usize>>,
 }
 
-/// Of fewer commands a quarter is one command, by which no hypothesis can be judged.
+/// Of fewer commands a quarter is one command, by which no hypothesis can be judged: two for every set of [`Split::new`].
 pub const COMMANDS_TO_CHOOSE_BY: usize = 8;
 /// One in so many commands is held out (a choice): the fit keeps three quarters of what was recorded.
 const ONE_IN: usize = 4;

@@ -21,11 +21,11 @@ use twin::arm::{ArmModel, JointState, Joints, stiffness_range};
 
 /// Rows that count are so far apart [ns]: smoothed over 80 ms to either side, those between say the same.
 const ROWS_APART_NS: u64 = 10_000_000;
-/// Speed at which dry friction is full [rad/s].
+/// Speed at which dry friction is full [rad/s] (a choice).
 const DRY_FRICTION_FULL_AT: f64 = 0.02;
-/// Fits that differ by more than this factor do not identify the stiffness.
+/// Fits that differ by more than this factor do not identify the stiffness (a choice).
 const LARGEST_SPREAD: f64 = 4.0;
-/// The search goes this factor beyond what the fits say: torques are of a nominal model.
+/// The search goes this factor beyond what the fits say (a choice): torques are of a nominal model.
 const SEARCHED_BEYOND: f64 = 2.0;
 /// Fewer clips cannot be left out in turn.
 const FEWEST_CLIPS: usize = 3;

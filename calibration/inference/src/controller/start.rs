@@ -15,8 +15,13 @@ use twin::effects::Search;
 const GAIN_POWERS: std::ops::RangeInclusive<i32> = -4..=4;
 /// Delays that are tried [s] (a choice).
 const DELAYS: [f64; 6] = [0.0, 0.005, 0.01, 0.02, 0.04, 0.08];
-/// So many clips say where the valley is (a choice).
-const CLIPS_OF_THE_GRID: usize = 3;
+/// So many clips say where the valley is (a choice), whatever is looked for coarsely.
+const CLIPS_OF_A_COARSE_LOOK: usize = 3;
+
+/// The first few of some clips, by which it is looked coarsely.
+pub fn first_few(clips: &[usize]) -> &[usize] {
+    &clips[..clips.len().min(CLIPS_OF_A_COARSE_LOOK)]
+}
 
 /// One place of the coarse grid: what was tried, and each joint's sum of squares there.
 struct Tried {
@@ -42,7 +47,7 @@ pub fn improve<F: Fn(&[f64]) -> Theta + Sync>(
     let powers: Vec<i32> = if ranged { GAIN_POWERS.collect() } else { vec![0] };
     let delays = if delayed { &DELAYS[..] } else { &DELAYS[..1] };
     let grid: Vec<(f64, i32)> = delays.iter().flat_map(|delay| powers.iter().map(|power| (*delay, *power))).collect();
-    let clips = &train[..train.len().min(CLIPS_OF_THE_GRID)];
+    let clips = first_few(train);
     let all: Vec<Tried> = grid
         .par_iter()
         .map(|(delay, power)| {

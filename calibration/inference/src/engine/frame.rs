@@ -4,9 +4,9 @@
 use serde::Serialize;
 use std::io::{self, Read};
 
-/// A text longer than this is no message of this protocol [bytes].
+/// A text longer than this is no message of this protocol [bytes] (a choice).
 const LONGEST_TEXT: u32 = 16 << 20;
-/// More numbers than this are none: 1 GiB.
+/// More numbers than this are none (a choice): 1 GiB.
 const MOST_NUMBERS: u32 = 1 << 27;
 
 /// What came in.

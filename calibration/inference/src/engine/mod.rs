@@ -33,7 +33,7 @@ pub use used::Used;
 
 use crate::interrupt::Interrupt;
 use message::{Greeting, ObjectBlock, Reply, RollOut, VERSION};
-use process::{Asked, Process, Running};
+use process::{Asked, POLL_INTERVAL, Process, Running};
 use recent::Recent;
 use serde_json::Value;
 use shared_mem::cell::{Cell, ClipKind};
@@ -47,11 +47,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-/// How often is looked whether the user asked for the end, so that processes nobody waits for are killed, too.
-const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Numbers of a pose: x, y, z, then a unit quaternion w, x, y, z.
 pub const POSE: usize = 7;
-/// By so much the length of a quaternion may be off: single precision, and a bit.
+/// By so much the length of a quaternion may be off [1]: what single precision makes of seven figures, and room for sums of them.
 const QUATERNION_NORM_TOLERANCE: f64 = 1e-4;
 
 /// How an engine is started.

@@ -13,9 +13,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often a wait looks whether the user asked for the end.
-const POLL_INTERVAL: Duration = Duration::from_millis(20);
-/// How long a process may take to end once its input has ended, before it is killed.
+/// How often a wait looks whether the user asked for the end (a choice).
+pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(20);
+/// How long a process may take to end once its input has ended, before it is killed (a choice).
 const EXIT_TIMEOUT: Duration = Duration::from_millis(400);
 
 /// The processes that run, for whoever has to end them all.

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
 
-/// So many numbers are kept at most: 128 MiB.
+/// So many numbers are kept at most (a choice): 128 MiB.
 const MAX_KEPT_NUMBERS: usize = 1 << 24;
 
 /// The last roll-outs, the oldest given up first.

@@ -15,9 +15,9 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// The variable that holds the mark.
 pub(super) const VARIABLE: &str = "TWINALIGN_ENGINE";
-/// A process that forks as fast as it is killed is pursued for so long.
+/// A process that forks as fast as it is killed is pursued for so long (a choice).
 const KILL_TIMEOUT: Duration = Duration::from_millis(500);
-/// How long the kernel is given to end what was killed before it is looked again.
+/// How long the kernel is given to end what was killed before it is looked again (a choice).
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 /// More than this of an environment is not read: the kernel starts no program with more, unless asked to [bytes].
 const MAX_ENVIRONMENT_BYTES: u64 = 8 << 20;

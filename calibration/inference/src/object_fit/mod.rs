@@ -39,14 +39,14 @@ const INITIAL_MODEL_ERROR: ModelError = ModelError {
     joints: Some(1e-4),
     flat: true,
 };
-/// Most steps of the first way, and of one that need not arrive.
+/// Most steps of the first way, and of one that need not arrive (choices).
 const INITIAL_STEPS: usize = 12;
 const ROUGH_STEPS: usize = 4;
-/// Rounds after it, each with the error that the round before left.
+/// Rounds after it, each with the error that the round before left (a choice).
 const ERROR_ROUNDS: usize = 4;
-/// Poses of a moving object, and rows of the arm, of which one is a witness: their errors last.
+/// Poses of a moving object, and rows of the arm, of which one is a witness: their errors last (a choice).
 const CORRELATED_ROWS: f64 = 5.0;
-/// Smallest error of the simulated joints: some steps of an encoder [rad].
+/// Smallest error of the simulated joints [rad]: some steps of an encoder (a choice).
 const MIN_JOINT_ERROR: f64 = 2e-5;
 
 /// Clips that are usually simulated until the end: for a bar alone.

@@ -16,10 +16,10 @@ const RAMP: Capture = Arm(ArmMotion::of(Kind::Ramp { speeds: [0.005, 0.5] }, 1))
 const HOLD: Capture = Arm(ArmMotion::of(Kind::Hold { poses: 8 }, 1));
 const MANY_HOLDS: ArmMotion = ArmMotion::of(Kind::Hold { poses: 12 }, 1);
 const HEADINGS: Capture = Strokes("--headings 8");
-const TURNED: Capture = Strokes("--turn-object 0,90,180");
+const OBJECT_TURNED: Capture = Strokes("--turn-object 0,90,180");
 const ONE_STROKE: Capture = Strokes("--clips 1");
 const AGAIN_SLOWER: Capture = StrokeAgain("--speed 0.5");
-const SLOWER: Capture = Strokes("--clips 4 --speed 0.5");
+const STROKES_SLOWER: Capture = Strokes("--clips 4 --speed 0.5");
 
 /// What records an experiment.
 fn capture(experiment: Experiment) -> Capture {
@@ -34,9 +34,9 @@ fn capture(experiment: Experiment) -> Capture {
         Experiment::StrokeAgainToolTurned => StrokeAgain("--turn-tool=-90"),
         Experiment::OneStroke => ONE_STROKE,
         Experiment::Strokes => Strokes("--clips 8"),
-        Experiment::StrokesSlower => SLOWER,
+        Experiment::StrokesSlower => STROKES_SLOWER,
         Experiment::Headings => HEADINGS,
-        Experiment::ObjectTurned => TURNED,
+        Experiment::ObjectTurned => OBJECT_TURNED,
         Experiment::StrokesWeighted => Elsewhere("weighted", "--clips 8"),
     }
 }
@@ -57,11 +57,12 @@ fn general(stage: Stage) -> (&'static str, &'static [Capture]) {
         Stage::Control => ("slow ramps, a chirp and rests in eight poses, torques logged", &[RAMP, CHIRP, HOLD]),
         Stage::Hit => (
             "straight hits on the object turned by 0, 90 and 180 degrees, and a stroke again at half its speed",
-            &[TURNED, AGAIN_SLOWER],
+            &[OBJECT_TURNED, AGAIN_SLOWER],
         ),
-        Stage::Slide => {
-            ("slides in eight headings through the same place, and others at half their speed", &[HEADINGS, SLOWER])
-        }
+        Stage::Slide => (
+            "slides in eight headings through the same place, and others at half their speed",
+            &[HEADINGS, STROKES_SLOWER],
+        ),
         Stage::Camera => {
             ("strokes that begin in places far apart; put the object there before each", &[ONE_STROKE, ONE_STROKE])
         }

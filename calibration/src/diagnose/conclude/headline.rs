@@ -50,7 +50,7 @@ impl Shrunk {
     }
 }
 
-/// Residuals beyond this multiple of the noise are said, even where they are no gap.
+/// Residuals beyond this multiple of the noise are said, even where they are no gap [1] (a choice).
 const SAID_FROM: f64 = 1.25;
 
 pub(super) fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> String {
@@ -105,7 +105,7 @@ pub(super) fn in_part(
     (after, looks_like): (&str, Option<&str>),
     rivals: &[String],
 ) -> String {
-    let strength = if unusual { ", stronger than it is met in practice," } else { "" };
+    let strength = if unusual { ", stronger than is plausible," } else { "" };
     let (verb, these) = match (facts.effects.len(), rivals.is_empty()) {
         (1, true) => ("explains", "it"),
         (_, true) => ("together explain", "them"),
@@ -155,7 +155,7 @@ fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> Str
         };
         facts.unproven.as_ref().map_or_else(String::new, unproven)
     } else {
-        let strength = if finding.implausible { ", stronger than it is met in practice," } else { "" };
+        let strength = if finding.implausible { ", stronger than is plausible," } else { "" };
         let shrinks = if finding.confirmed {
             format!("shrinks it {} and leaves more than a cause does", facts.shrink.in_words())
         } else {
@@ -249,7 +249,7 @@ mod tests {
         );
         let text = in_part(&facts(&["payload"]), (&share, true), ("1 mm", None), &[]);
         assert!(text.ends_with("no effect of the library explains much of that."), "{text}");
-        assert!(text.starts_with("payload, stronger than it is met in practice, explains 96 %"), "{text}");
+        assert!(text.starts_with("payload, stronger than is plausible, explains 96 %"), "{text}");
         let rivals = ["joint_coulomb_friction".to_owned()];
         let text = in_part(&facts(&["load friction (0.44)"]), (&share, false), ("1 mm", None), &rivals);
         assert!(text.starts_with("One of load friction (0.44), joint coulomb friction explains 96 %"), "{text}");
@@ -268,7 +268,7 @@ mod tests {
         assert!(text.starts_with("No effect of the library explains the gap, 2.13 mrad RMS"), "{text}");
         assert!(text.contains("payload (mass 0.4 kg) comes nearest but shrinks it by 96 %"), "{text}");
         let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 6.5) };
-        assert!(said(&pushed, &["payload"]).contains("stronger than it is met in practice"));
+        assert!(said(&pushed, &["payload"]).contains("stronger than is plausible"));
         let unproven = NotProven { effect: "payload (mass 0.4 kg)".into(), share: 0.63, clips: 4, more: 5 };
         let open = Facts { unproven: Some(unproven), ..facts(&[]) };
         let found = finding(vec![], 500.0, 500.0);

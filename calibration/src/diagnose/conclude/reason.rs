@@ -41,7 +41,7 @@ pub(in crate::diagnose) fn reason<E: Evidence>(bench: &Bench<'_, E>, found: &Fou
         }
         (Status::NotTestable, _) => {
             return format!(
-                "not identifiable: at the largest size met in practice its signature reaches {:.1} sigma beyond what other \
+                "not identifiable: at the largest plausible size its signature reaches {:.1} sigma beyond what other \
                  parameters imitate, and {TESTABLE:.0} are needed",
                 scored.signal
             );
@@ -130,7 +130,7 @@ fn nearest(judged: &Judged<'_>) -> String {
     {
         return "less likely than not".into();
     }
-    let strength = if finding.implausible { "only at a size beyond what is met in practice, and " } else { "" };
+    let strength = if finding.implausible { "only at a size beyond what is plausible, and " } else { "" };
     format!(
         "comes nearest, but {strength}residuals stay {} what noise alone leaves: a cause leaves less",
         times_noise(judged)

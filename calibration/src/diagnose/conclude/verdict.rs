@@ -68,7 +68,7 @@ impl Verdict {
 /// So near its limit a confidence is shown as the limit [1]: half a percent, as it is printed.
 const SHOWN_AS_THE_LIMIT: f64 = 0.005;
 
-/// What is stronger than what is plausible is believed where it explains this much [%]: a substitute does not.
+/// What is stronger than what is plausible is believed where it explains this much [%] (a choice): a substitute does not.
 const BELIEVED_BEYOND_RANGE: f64 = 99.5;
 
 /// What is less likely than not is not named [1].
@@ -256,7 +256,7 @@ pub(in crate::diagnose) mod tests {
     }
 
     #[test]
-    fn an_effect_beyond_what_is_met_in_practice_is_a_substitute() {
+    fn an_effect_beyond_what_is_plausible_is_a_substitute() {
         let exact = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 1.5) };
         assert_eq!(exact.decide().kind, Kind::Named, "stronger than usual, and exactly that");
         let pushed = Finding { implausible: true, ..finding(vec!["payload"], 500.0, 6.5) };

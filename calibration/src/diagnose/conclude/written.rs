@@ -15,7 +15,7 @@ use shared_mem::recording::Session;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Files for one answer at most: eight clips differ as much as more would.
+/// Files for one answer at most (a choice): eight clips differ as much as more would.
 const MOTIONS_WRITTEN: usize = 8;
 
 /// Plans the motions and writes each beside `answer`: `report_motion_1.csv` beside `report.html`. A file that is there already is

@@ -5,23 +5,23 @@ use super::Model;
 use crate::answer::identification::{Figures, Identification};
 use crate::identify::finding::Finding;
 use crate::identify::used::Used;
+use inference::controller::start::first_few;
 use inference::estimate::{ClipFit, Fit};
 use inference::likelihood::Setting;
 use inference::statistics::median;
 use nalgebra::DMatrix;
+use shared_mem::time::seconds_between;
 use twin::effects::{Parameter, Search, registry};
 
-/// Residuals this many times as large as their sigmas are no noise.
+/// Residuals this many times as large as their sigmas are no noise (a choice).
 const BEYOND_NOISE: f64 = 3.0;
-/// An error that is no smaller than this share of what it was before is no better.
+/// An error that is no smaller than this share of what it was before is no better (a choice).
 const NO_BETTER: f64 = 0.95;
-/// Clips of one robot do not leave so little of their squared error when each may have numbers of its own.
+/// Clips of one robot do not leave so little of their squared error when each may have parameters of its own (a choice).
 const SHARE_LEFT_ALONE: f64 = 0.3;
-/// A common delay that explains this share of what is left is worth searching.
+/// A common delay that explains this share of what is left is worth searching (a choice).
 const SHARE_OF_A_DELAY: f64 = 0.5;
-/// So many clips tell a delay.
-const CLIPS_FOR_A_DELAY: usize = 3;
-/// Numbers that hang together closer than this are held by a little of their own information.
+/// Scaled information on parameters that hang together closer than this is held by as much of its own [1]: far above rounding.
 const RIDGE: f64 = 1e-9;
 
 /// Doubts about a fit that began at `before`, most telling first.
@@ -102,14 +102,14 @@ fn delay(numbers: &[f64], model: &Model<'_>, clips: &Used) -> Option<(f64, f64)>
     let dof = model.arm().dof();
     // Joint by joint: sums of error x speed, speed squared, error squared.
     let mut sums = vec![[0.0; 3]; dof];
-    for clip in clips.split.train.iter().take(CLIPS_FOR_A_DELAY) {
+    for clip in first_few(&clips.split.train) {
         let predicted = model.predict_in(1, (*clip, numbers, &[])).ok()?;
         let clip = model.clip(*clip);
         let measured = &clip.recorded.measured;
         let rows: Vec<usize> = clip.averaged().map(|bin| bin[0]).collect();
         for (joint, sums) in sums.iter_mut().enumerate() {
             let q = |row: usize| measured.q_row(row)[joint];
-            let seconds = |a: usize, b: usize| (measured.stamps_ns[b] - measured.stamps_ns[a]) as f64 * 1e-9;
+            let seconds = |a: usize, b: usize| seconds_between(measured.stamps_ns[a], measured.stamps_ns[b]);
             let pairs = rows
                 .windows(3)
                 .map(|w| (q(w[1]) - predicted[w[1]].state.q[joint], (q(w[2]) - q(w[0])) / seconds(w[0], w[2])));

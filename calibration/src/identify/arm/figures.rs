@@ -4,7 +4,7 @@ use super::Model;
 use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Figures, Identification};
 use crate::identify::error::IdentifyError;
-use crate::identify::figures::{FITTED, HELD_OUT, Odd, gap, odd};
+use crate::identify::figures::{Odd, USE_FITTED, USE_HELD_OUT, gap, odd};
 use crate::identify::used::Used;
 use inference::estimate::{Random, Schedule, Subset, score};
 use rayon::prelude::*;
@@ -30,8 +30,8 @@ pub(super) fn fill(
     random: &[Random],
     numbers: [&[f64]; 2],
 ) -> Result<(), IdentifyError> {
-    let train = clips.split.train.iter().map(|clip| (*clip, FITTED));
-    let jobs: Vec<(usize, &str)> = train.chain(clips.split.confirm.iter().map(|clip| (*clip, HELD_OUT))).collect();
+    let train = clips.split.train.iter().map(|clip| (*clip, USE_FITTED));
+    let jobs: Vec<(usize, &str)> = train.chain(clips.split.confirm.iter().map(|clip| (*clip, USE_HELD_OUT))).collect();
     let done: Vec<(ClipGap, Trace)> = jobs
         .par_iter()
         .map(|(clip, used)| one(model, *clip, used, random, numbers))

@@ -2,23 +2,21 @@
 //! there; a limit that already clips some torque has one.
 
 use super::Model;
-use inference::controller::start::costs;
+use inference::controller::start::{costs, first_few};
 use inference::estimate::{ClipModel, Fit, Schedule, Subset, Unknown, fit};
 use inference::interrupt::Interrupt;
 use inference::likelihood::Setting;
 use rayon::prelude::*;
 use twin::effects::Search;
 
-/// Limits that are tried, each this many times lower than the one before [1]...
+/// Limits that are tried, each this many times lower than the one before [1] (a choice)...
 const LADDER_RATIO: f64 = 1.4;
-/// ...from the highest that an arm of this size has [N m]: joints 1 to 4 of an FR3.
+/// ...from the highest that an arm of this size has [N m]: joints 1 to 4 of an FR3 (its data sheet).
 const HIGHEST_LIMIT: f64 = 87.0;
-/// A limit is there when it leaves less than this share of its joint's squared error.
+/// A limit is there when it leaves less than this share of its joint's squared error (a choice).
 const ERROR_LEFT_BY_A_LIMIT: f64 = 0.9;
-/// Iterations of the rough fit before.
+/// Iterations of the rough fit before (a choice).
 const ROUGH_ITERATIONS: usize = 4;
-/// So many clips tell whether there is one.
-const CLIPS_OF_THE_LADDER: usize = 3;
 
 /// Moves the start of each joint's limit, one after the other, to the best of a ladder; where none is better it stays without.
 pub(super) fn improve(
@@ -28,7 +26,7 @@ pub(super) fn improve(
     unknowns: &mut [Unknown],
     interrupt: &Interrupt,
 ) {
-    let clips = &train[..train.len().min(CLIPS_OF_THE_LADDER)];
+    let clips = first_few(train);
     if settings.iter().all(|setting| limited(setting).is_none()) {
         return;
     }
@@ -57,12 +55,12 @@ pub(super) fn improve(
 /// Takes away limits without which the twin is as good where the search ended: they say nothing there, and elsewhere they
 /// would clip.
 pub(super) fn forget_unreached(model: &Model<'_>, settings: &[Setting], fit: &mut Fit) {
-    let clips: Vec<usize> = (0..model.clips().min(CLIPS_OF_THE_LADDER)).collect();
+    let all: Vec<usize> = (0..model.clips()).collect();
     for (k, setting) in settings.iter().enumerate() {
         let Some(joint) = limited(setting).filter(|_| fit.shared[k] > 0.0) else { continue };
         let mut without = fit.shared.clone();
         without[k] = 0.0;
-        let [with, none] = [&fit.shared, &without].map(|numbers| costs(model, &clips, numbers)[joint]);
+        let [with, none] = [&fit.shared, &without].map(|numbers| costs(model, first_few(&all), numbers)[joint]);
         if with >= ERROR_LEFT_BY_A_LIMIT * none {
             fit.shared = without;
         }

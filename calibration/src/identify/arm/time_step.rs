@@ -9,9 +9,9 @@ use inference::estimate::{ClipFit, Fit, Impossible, Random, Shifted, Subset, Unk
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-/// From the difference to half steps to the whole error of whole ones.
+/// From the difference to half steps to the whole error of whole ones: `1 / (1 - 1/4)` for a rule of second order.
 const RICHARDSON: f64 = 4.0 / 3.0;
-/// What of the error a robot, or a simulator in its place, may have itself: a quarter, as with half steps.
+/// What of the error a robot, or a simulator in its place, may have itself (a choice): a quarter, as with half steps.
 const SHARE_LEFT_OPEN: f64 = 0.25;
 
 /// How far the numbers of a fit to the clips in `train` move once the time step is taken out.

@@ -15,11 +15,11 @@ const GAIN_OPEN_FROM: f64 = 0.25;
 const EFFECT_OPEN_FROM: f64 = 0.5;
 /// An interval is judged by its share of a number, or of this share of its search where the number is nearly 0 (a choice).
 const LEAST_SIZE: f64 = 0.05;
-/// Estimates that move together this closely are one number.
+/// Estimates whose correlation is closer than this are one number (a choice).
 const ONE_NUMBER: f64 = 0.99;
 /// Of a number that is nowhere near a bound, when the search did not arrive.
 const DID_NOT_ARRIVE: &str = "the search ended before it arrived: gains alone do not explain these clips";
-/// An effect this near to neutral is absent, as a share of its search.
+/// An effect this near to neutral is absent, as a share of its search: rounding.
 const ABSENT_BELOW: f64 = 1e-9;
 
 /// Numbers that are not identifiable.
@@ -90,7 +90,7 @@ fn at_bound(finding: &Finding<'_>, k: usize) -> Option<String> {
     let remedy = match setting {
         Setting::Stiffness(_) => "widen `stiffness_range` in cell.toml, or ask `calibration diagnose` what else acts",
         Setting::Damping(_) => "widen `damping_range` in cell.toml, or ask `calibration diagnose` what else acts",
-        _ => "that is beyond what is met in practice, so something else acts",
+        _ => "that is beyond what is plausible, so something else acts",
     };
     Some(format!("the best value lies at or beyond {value:.4}, the {end} bound of the search: {remedy}"))
 }

@@ -3,7 +3,8 @@
 use super::model::Motion;
 use super::noise::Noise;
 
-/// Stretches whose mean residual must be that of noise, and by how many standard deviations it may be off, as the mean square may.
+/// Stretches whose mean residual must be that of noise, and by how many standard deviations it may be off, as the mean square may
+/// (choices).
 const STRETCHES: usize = 6;
 const SIGMAS_OF_DISAGREEMENT: f64 = 3.5;
 

@@ -8,30 +8,30 @@ use super::positions::Positions;
 use std::ops::Range;
 use twin::world::LoneJoint;
 
-/// Rows to each side whose slope is the velocity: few for fast motions, more for slow ones.
+/// Rows to each side whose slope is the velocity: few for fast motions, more for slow ones (choices).
 const SLOPE_ROWS: [usize; 3] = [2, 4, 8];
-/// A part moves that is faster than noise makes it look by so many standard deviations.
+/// A part moves that is faster than noise makes it look by so many standard deviations (a choice).
 const MOVING_SIGMAS: f64 = 5.0;
-/// Rows of rest within a motion: it turns round, or a push goes on.
+/// Rows of rest within a motion (a choice): it turns round, or a push goes on.
 const MAX_PAUSE_ROWS: usize = 3;
-/// Rows of rest that a motion is taken with at its end, and for how long at most [s].
+/// A rest lasts at least so long, and a motion is taken with so much of the rest at its end [s] (a choice).
 const REST_SECONDS: f64 = 0.3;
-/// Fewest rows in which it moves, and least travel in standard deviations, of a motion of use.
+/// Fewest rows in which it moves, and least travel in standard deviations, of a motion of use (choices).
 const MIN_ROWS: usize = 6;
 const MIN_TRAVEL_SIGMAS: f64 = 20.0;
-/// A motion is over once the part is slower than this share of its highest speed.
+/// A motion is over once the part is slower than this share of its highest speed (a choice).
 const END_SPEED_SHARE: f64 = 0.5;
 /// At the beginning of a stretch a push may still go on without a trace: over so short a time that it moves the part by `a t² / 8` beside
 /// a straight line, less than two standard deviations of a position.
 const PUSH_FACTOR: f64 = 16.0;
-/// Share of the way that is kept where its beginning is cut off.
+/// Share of the way that is kept where its beginning is cut off (a choice).
 pub(super) const MIN_KEPT_TRAVEL: f64 = 0.5;
-/// A part runs into something if it is faster than this share of its highest speed before its last rows.
+/// A part runs into something if it is faster than this share of its highest speed before its last rows (a choice).
 const IMPACT_SPEED_SHARE: f64 = 0.25;
 /// Ends and beginnings that are tried.
 const TRIED_ENDS: usize = 12;
 const TRIED_BEGINNINGS: usize = 24;
-/// A part's frame and the joint's law are not exact: residuals of this share of the travel count as noise.
+/// A part's frame and the joint's law are not exact: residuals of this share of the travel count as noise (a choice).
 const MODEL_ERROR_SHARE: f64 = 1e-3;
 
 /// A motion and the rows of the clip that it is.

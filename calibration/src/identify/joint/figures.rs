@@ -5,13 +5,13 @@ use super::model::Motion;
 use super::{Material, OfClip};
 use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Clips, Figures, Gap, Identification, NotIdentifiable, Parameter};
-use crate::identify::figures::FITTED;
+use crate::identify::figures::USE_FITTED;
 use crate::identify::finding::rows;
 use inference::admit::remarks::grouped;
 use inference::estimate::ClipFit;
 use std::collections::BTreeMap;
 
-/// Below so many motions the interval rests on how noisy the poses are: whether friction is the same each time remains open.
+/// Below so many motions the interval rests on how noisy the poses are: whether friction is the same each time remains open (a choice).
 const MOTIONS_TO_COMPARE: usize = 3;
 /// Residuals so many times the noise are no noise (a choice).
 const BEYOND_NOISE: f64 = 1.5;
@@ -49,7 +49,7 @@ pub(super) fn answer(
             rms(held_out.unwrap_or(&found.fit.clips).get(own.clone()).unwrap_or_default(), &motions[own.clone()]);
         by_clip.push(ClipGap {
             file: looked.file.clone(),
-            used: if held_out.is_some() { "held out in turn".into() } else { FITTED.into() },
+            used: if held_out.is_some() { "held out in turn".into() } else { USE_FITTED.into() },
             joint_rms_rad: after.joint_rms_rad.into_iter().collect(),
             after,
             before: rms(&before[own.clone()], &motions[own]),

@@ -6,8 +6,8 @@ use inference::estimate::interval::LEVEL;
 use inference::estimate::{ClipFit, Fit, Intervals, Schedule, Unknown, score};
 use inference::statistics::student;
 
-/// A number is not identifiable if its interval, to either side, is more than this share of what slows the part in all: the other may
-/// as well be what does.
+/// A number is not identifiable if its interval, to either side, is more than this share of what slows the part in all (a choice): the
+/// other may as well be what does.
 const MAX_INTERVAL_SHARE: f64 = 0.5;
 
 /// Friction and damping of a joint.

@@ -47,7 +47,7 @@ use subject::Subject;
 use twin::arm::{ModelError, with_files_found_from, with_joint_friction};
 use twin::world::LoneJoint;
 
-/// A part that rests nearer than this to the end of its joint's range may lie on a stop, as a share of the range.
+/// A part that rests nearer than this to the end of its joint's range may lie on a stop, as a share of the range (a choice).
 const NEAR_A_STOP: f64 = 0.02;
 
 /// What to identify.

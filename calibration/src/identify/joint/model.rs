@@ -29,7 +29,7 @@ pub(super) struct Motion {
     pub(super) joint: LoneJoint,
 }
 
-/// Fewest rows from which a start is read.
+/// Fewest rows from which a start is read (a choice).
 const ROWS_OF_A_START: usize = 3;
 
 impl Motion {

@@ -3,21 +3,21 @@
 
 use inference::statistics::median;
 
-/// Rows of a window in which a part may rest.
+/// Rows of a window in which a part may rest (a choice: half a second of a tracker).
 const ROWS_OF_A_WINDOW: usize = 30;
-/// A window is one of rest if its rows scatter by at most so many times what changes from row to row.
+/// A window is one of rest if its rows scatter by at most so many times what changes from row to row (a choice).
 const SCATTER_AT_REST: f64 = 3.0;
-/// Degree of a smooth curve through a window in which it moves.
+/// Degree of a smooth curve through a window in which it moves (a choice).
 const DEGREE_OF_A_CURVE: usize = 3;
-/// Fewest windows of rest that say something.
+/// Fewest windows of rest that say something (a choice).
 const FEWEST_WINDOWS: usize = 3;
 /// A median absolute deviation is so many standard deviations of a normal distribution.
 const MEDIAN_DEVIATION_OF_NORMAL: f64 = 0.674_49;
 /// Of the third difference of independent rows: the root of 1 + 9 + 9 + 1.
 const SIGMA_OF_A_THIRD_DIFFERENCE: f64 = 4.472_136;
-/// What lasts keeps at most this share from row to row.
+/// What lasts keeps at most this share from row to row (a choice).
 const LARGEST_SHARE_KEPT: f64 = 0.9;
-/// Rounds in which the share that windows lose is found.
+/// Rounds in which the share that windows lose is found (a choice).
 const ROUNDS: usize = 5;
 
 /// Noise of positions.

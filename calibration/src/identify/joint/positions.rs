@@ -7,11 +7,11 @@ use shared_mem::recording::{Clip, ObjectSeries};
 use std::f64::consts::{PI, TAU};
 use twin::scene::joint_position;
 
-/// A part that the poses show so far beside its joint is not on it [m, rad]: its frame is another one than the URDF's. Gravity pulls
-/// by the angle from the URDF's zero, so what is turned by more leaves another friction.
+/// A part that the poses show so far beside its joint is not on it [m, rad] (choices): its frame is another one than the URDF's. Gravity
+/// pulls by the angle from the URDF's zero, so what is turned by more leaves another friction.
 const OFF_THE_JOINT: f64 = 0.03;
 const TURNED_OFF_THE_JOINT: f64 = 0.15;
-/// A pose of the carrier counts for so long before its first and after its last stamp [s].
+/// A pose of the carrier counts for so long before its first and after its last stamp [s] (a choice).
 const CARRIER_POSE_HOLDS: f64 = 0.2;
 /// Fewest rows of use.
 const FEWEST_ROWS: usize = 10;

@@ -10,7 +10,7 @@ use inference::estimate::Fit;
 
 /// Cuts of a motion's beginning, each by the same number of rows.
 const CUTS_PER_MOTION: usize = 24;
-/// A motion from which the others lead farther away than this share of its travel is none of the same joint by itself.
+/// A motion from which the others lead farther away than this share of its travel is none of the same joint by itself (a choice).
 const MAX_DISAGREEMENT: f64 = 0.1;
 
 /// Cuts the beginnings of motions until one friction and one damping explain them all, worst first. A motion that half of its way does

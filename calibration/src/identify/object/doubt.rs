@@ -5,7 +5,7 @@ use crate::identify::figures::{Odd, odd};
 use inference::likelihood::object::noise_of;
 use shared_mem::cell::Cell;
 
-/// ADD on the clips fitted, over the tracker's noise, from which on it is neither noise nor chance in the hits.
+/// ADD on the clips fitted, over the tracker's noise, from which on it is neither noise nor chance in the hits (a choice).
 const BEYOND_NOISE: f64 = 7.0;
 /// A clip is none of the others' kind when its ADD is this many times the middle clip's.
 const TIMES_THE_USUAL_ERROR: f64 = 4.0;

@@ -4,7 +4,7 @@ use super::material::Material;
 use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Figures, Identification};
 use crate::identify::error::IdentifyError;
-use crate::identify::figures::{FITTED, HELD_OUT, gap};
+use crate::identify::figures::{USE_FITTED, USE_HELD_OUT, gap};
 use inference::engine::Engine;
 use inference::likelihood::object::Replays;
 use rayon::prelude::*;
@@ -35,7 +35,7 @@ pub(super) fn fill(
         let held_out = material.used.split.confirm.contains(&clip);
         answer.by_clip.push(ClipGap {
             file: usable.file.clone(),
-            used: if held_out { HELD_OUT } else { FITTED }.into(),
+            used: if held_out { USE_HELD_OUT } else { USE_FITTED }.into(),
             joint_rms_rad: after[clip].joint_rms_rad.clone().unwrap_or_default(),
             after: figures(&after[clip]),
             before: figures(&before[clip]),

@@ -9,7 +9,7 @@ use shared_mem::frames::{Base, Object, Pose};
 use twin::metrics::SurfacePoints;
 use twin::scene::ObjectShape;
 
-/// Poses of a clip that count, evenly spaced: more do not move the mean.
+/// Poses of a clip that count, evenly spaced (a choice): more do not move the mean.
 const POSES_OF_A_CLIP: usize = 40;
 
 /// A simulated pose in the measured object's frame: how far it lies off [m] and its turn [rad], axis times angle.

@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 use shared_mem::cell::ClipKind;
 use twin::scene::ObjectShape;
 
-/// No number is taken for known better than this share of its range.
+/// No number is taken for known better than this share of its range (a choice).
 const MIN_SPREAD_SHARE: f64 = 0.01;
 
 /// What is searched: the numbers and what they mean, the object's shape, and the seed of the cloud.

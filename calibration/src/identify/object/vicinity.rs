@@ -16,18 +16,18 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Times that points are scattered.
+/// Times that points are scattered (a choice).
 const SCATTER_ROUNDS: usize = 3;
-/// First width of the scatter, in what coordinates are counted in, and its shrinking from round to round.
+/// First width of the scatter, in what coordinates are counted in, and its shrinking from round to round (choices).
 const INITIAL_WIDTH: f64 = 1.5;
 const WIDTH_SHRINK: f64 = 0.6;
-/// How far the modelled loss may lead away from the middle of the scatter, in its widths.
+/// How far the modelled loss may lead away from the middle of the scatter, in its widths (a choice).
 const REACH_IN_WIDTHS: f64 = 2.0;
-/// Looks at the modelled loss in a round.
+/// Looks at the modelled loss in a round (a choice).
 const MODEL_EVALUATIONS: usize = 400;
-/// Of the poses that count, every third is modelled.
+/// Of the poses that count, every third is modelled (a choice).
 const POSE_STRIDE: usize = 3;
-/// What the regression holds slopes back with, in squared widths: enough for a direction that few points went to.
+/// What the regression holds slopes back with, in squared widths (a choice): enough for a direction that few points went to.
 const SLOPE_RIDGE: f64 = 0.3;
 
 /// Points whose loss is asked for at most, of so many coordinates: where all begins, and in every round those scattered

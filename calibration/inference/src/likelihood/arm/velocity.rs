@@ -9,9 +9,9 @@ use crate::statistics::median;
 use shared_mem::recording::JointSeries;
 use shared_mem::time::seconds_between;
 
-/// Motion must exceed the noise of a channel so many times before a ratio is formed from it [sigma]: the error of the ratio
-/// is then below 5 %.
-pub const MOVES: f64 = 20.0;
+/// Motion must exceed the noise of a channel so many times before a ratio is formed from it [1]: the error of the ratio is then
+/// below 5 %.
+pub const MOTION_OVER_NOISE: f64 = 20.0;
 /// A joint moves when it leaves its mean by this, one sigma over the clip [rad].
 pub const LEAST_MOTION: f64 = 1e-3;
 /// Velocities are compared with slopes over windows of so many rows, and at least of this length [s]: long enough that the
@@ -75,7 +75,7 @@ impl Motion<'_> {
         };
         let windows: Vec<[f64; 3]> = ends.map(window).collect();
         let moved = (windows.iter().map(|w| w[0] * w[0]).sum::<f64>() / windows.len().max(1) as f64).sqrt();
-        if moved <= MOVES * noise || spread(q) < LEAST_MOTION {
+        if moved <= MOTION_OVER_NOISE * noise || spread(q) < LEAST_MOTION {
             return None;
         }
         // Windows at rest agree with any factor.

@@ -54,7 +54,7 @@ pub(super) const AFTER_HITS: [Deviation; 9] = [
 
 /// Of an object alone, by the end of its motion: as wide as those of a free slide after a hit, so that a slide still shows
 /// what bends it. One that tumbles is beyond that by many times, which the heavy tails bear.
-pub(super) const ALONE: [Deviation; 5] = [
+pub(super) const OF_AN_OBJECT_ALONE: [Deviation; 5] = [
     deviation("along the motion", Coordinate::Along, Shape::InTime, PLACE_SIGMA),
     deviation("across the motion", Coordinate::Across, Shape::InTime, PLACE_SIGMA),
     deviation("yaw of the motion", Coordinate::Yaw, Shape::InTime, TURN_SIGMA),

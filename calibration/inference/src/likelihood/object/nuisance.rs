@@ -1,7 +1,7 @@
 //! Nuisance parameters of a clip with an object: what every clip has of its own, zero where it is like all others, and which of them
 //! count for whom.
 
-use super::deviations::{AFTER_HITS, ALONE, Deviation};
+use super::deviations::{AFTER_HITS, Deviation, OF_AN_OBJECT_ALONE};
 use super::noise_of;
 use crate::estimate::Random;
 use crate::likelihood::random_effects::RandomEffects;
@@ -46,7 +46,7 @@ pub const IDENTIFIED: &[Nuisance] = &[
 /// What the diagnosis estimates of a clip: deviations of the path in place of its beginning, since forty effects are compared and these
 /// cost no simulation.
 pub fn diagnosed(kind: ClipKind) -> Vec<Nuisance> {
-    let path: &[Deviation] = if kind == ClipKind::FreeMotion { &ALONE } else { &AFTER_HITS };
+    let path: &[Deviation] = if kind == ClipKind::FreeMotion { &OF_AN_OBJECT_ALONE } else { &AFTER_HITS };
     let before = [Nuisance::LnFriction, Nuisance::Clock].into_iter().filter(|own| own.acts_in(kind));
     before.chain(path.iter().map(Nuisance::Path)).collect()
 }

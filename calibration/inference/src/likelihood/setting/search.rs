@@ -110,7 +110,7 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
 }
 
 /// How far beyond what is plausible an effect is searched, over the width of that range [1]: a choice.
-const WIDENED: f64 = 0.5;
+const SEARCHED_BEYOND_PLAUSIBLE: f64 = 0.5;
 /// Difference step over the width of what is plausible [1].
 const EFFECT_STEP: f64 = 2e-3;
 /// The same where hits lie between the number and what is seen, of a tool or of a gear's flanks: over this step their
@@ -152,9 +152,9 @@ pub fn effect_settings(info: &'static EffectInfo, robot: &Robot, dof: usize) -> 
 fn searched(parameter: &Parameter, met: Range, inverse: bool) -> Range {
     let [lo, hi] = met;
     if inverse {
-        return [0.0, (1.0 + WIDENED) / lo];
+        return [0.0, (1.0 + SEARCHED_BEYOND_PLAUSIBLE) / lo];
     }
-    let more = WIDENED * (hi - lo);
+    let more = SEARCHED_BEYOND_PLAUSIBLE * (hi - lo);
     let rest = parameter.resting_value();
     let [least, most] = parameter.possible;
     // A form like an angle wraps around: no more of it makes sense.
