@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// What was found about a session.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Diagnosis {
     pub verdict: Verdict,
     /// How large the gap is.
@@ -111,7 +111,7 @@ impl Diagnosis {
     }
 }
 
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Verdict {
     /// Which of the five it is.
     pub kind: Kind,
@@ -159,10 +159,11 @@ pub enum Basis {
 }
 
 /// The five verdicts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// No gap beyond the noise.
+    #[default]
     None,
     /// One to four effects cause it.
     Named,
@@ -175,7 +176,7 @@ pub enum Kind {
 }
 
 /// The gap on the confirm clips.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Gap {
     /// `sigma`: [`Self::before`], [`Self::after`] and [`Self::floor`] are mean squares of residuals in units of their noise.
     pub unit: &'static str,
@@ -254,7 +255,7 @@ pub struct Nearest {
 }
 
 /// A share with its 90 % interval.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct Share {
     pub value: f64,
     /// Its interval over clips.

@@ -80,10 +80,9 @@ fn by_hand(effect: &str) -> &'static str {
 /// What to record next to separate these effects.
 pub fn separating(effects: &[&str], site: &Site) -> Advice {
     let pairs = effects.iter().enumerate().flat_map(|(k, a)| effects[k + 1..].iter().map(move |b| (*a, *b)));
+    let all = effects.iter().map(|effect| words(effect)).collect::<Vec<_>>().join(", ");
     if let (true, [first, ..]) = (site.objects_alone(), effects) {
-        let effects: Vec<String> = effects.iter().map(|effect| words(effect)).collect();
-        let sentence = format!("To separate {}: {}.", effects.join(", "), by_hand(first));
-        return site.advice(sentence, &[]);
+        return site.advice(format!("To separate {all}: {}.", by_hand(first)), &[]);
     }
     if let Some(([a, b], apart)) = pairs.filter_map(|(a, b)| separation(a, b)).next() {
         let captures: Vec<Capture> = apart.record.iter().map(|experiment| capture(*experiment)).collect();
@@ -99,26 +98,22 @@ pub fn separating(effects: &[&str], site: &Site) -> Advice {
         }
     }
     let (clips, captures): (Vec<_>, Vec<_>) = stages.into_iter().map(general).unzip();
-    let effects: Vec<String> = effects.iter().map(|effect| words(effect)).collect();
-    site.advice(format!("To separate {}: {}.", effects.join(", "), clips.join("; ")), &captures.concat())
+    site.advice(format!("To separate {all}: {}.", clips.join("; ")), &captures.concat())
 }
 
 /// What to record next to confirm what was found.
 pub fn confirming(effects: &[String], site: &Site) -> Advice {
-    let (clips, steps) = site.again(2);
     let effects: Vec<String> = effects.iter().map(|effect| words(effect)).collect();
-    site.finished(format!("To confirm {}: {clips}.", effects.join(" and ")), steps)
+    site.again(2, |clips| format!("To confirm {}: {clips}.", effects.join(" and ")))
 }
 
 /// What to record where something unknown is left.
 pub fn unexplained(place: Option<(&str, &str)>, site: &Site) -> Advice {
     let Some((channel, regime)) = place else { return Advice::default() };
-    let (clips, steps) = site.again(8);
     let channel = channel_in_words(channel);
-    let sentence = format!(
-        "What is left is largest in {channel} ({regime}): {clips}, to see whether it repeats and how it grows."
-    );
-    site.finished(sentence, steps)
+    site.again(8, |clips| {
+        format!("What is left is largest in {channel} ({regime}): {clips}, to see whether it repeats and how it grows.")
+    })
 }
 
 /// What to record where an effect is likely, and so many clips more would prove it.

@@ -34,11 +34,12 @@ pub(super) struct Shown<'a> {
 pub(super) fn decide<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Decided<'a> {
     let finding = finding(case, measures);
     let decision = finding.decide();
-    let unexplained = decision.kind == Kind::Unexplained;
-    let before = &measures.without.left;
-    let proven =
-        || partly::proven(case.bench, case.split, case.found, before, &measures.overdispersion, case.options.seed);
-    let partly = if unexplained { proven() } else { None };
+    let partly = if decision.kind == Kind::Unexplained {
+        let (before, overdispersion) = (&measures.without.left, &measures.overdispersion);
+        partly::proven(case.bench, case.split, case.found, before, overdispersion, case.options.seed)
+    } else {
+        None
+    };
     Decided { finding, decision, partly }
 }
 
@@ -101,11 +102,10 @@ fn finding<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Finding<
 
 /// How sure the weakest of the effects that were found is.
 pub(super) fn sureness(found: &Found) -> f64 {
-    let of = |(place, effect): (usize, usize)| {
+    found.kept().fold(1.0, |least, (place, effect)| {
         let all = confidence::probabilities(&found.steps[place].trials, false);
-        all.iter().find(|(candidate, _)| *candidate == effect).map_or(0.5, |(_, p)| *p)
-    };
-    found.kept().map(of).fold(1.0, f64::min)
+        all.iter().find(|(candidate, _)| *candidate == effect).map_or(0.5, |(_, p)| *p).min(least)
+    })
 }
 
 /// Whether a rival of an effect does as well in its place beside all the others that were found: where several act, what one
@@ -113,8 +113,8 @@ pub(super) fn sureness(found: &Found) -> f64 {
 fn stands_in<E: Evidence>(case: &Case<'_, E>, step: &Step, effect: usize, rival: usize) -> bool {
     let Case { bench, split, found, .. } = *case;
     let (last, weights) = (&found.last, &found.steps[found.steps.len() - 1].weights);
-    let fitted = step.trials.iter().find(|trial| trial.scored.candidate == rival);
-    let Some((fit, _)) = fitted.and_then(|trial| trial.fitted.as_ref()).filter(|_| last.effects.len() > 1) else {
+    let fitted = step.trial(rival).and_then(|trial| trial.fitted.as_ref());
+    let Some((fit, _)) = fitted.filter(|_| last.effects.len() > 1) else {
         return true;
     };
     let effects: Vec<usize> = last.effects.iter().map(|other| if *other == effect { rival } else { *other }).collect();

@@ -97,15 +97,17 @@ fn named(finding: &Finding<'_>, facts: &Facts) -> String {
     )
 }
 
-/// The sentence where what was found is proven, but a part of the gap stays. `share`: what it explains, and whether it is stronger
-/// than what is plausible; `after`: how large what stays is; `rivals`: effects that do as well as one of those found.
+/// The sentence where what was found is proven, but a part of the gap stays. `share`: what it explains; `unusual`: whether it is
+/// stronger than what is plausible; `after`: how large what stays is; `rivals`: effects that do as well as one of those found.
 pub(super) fn in_part(
     facts: &Facts,
-    (share, unusual): (&Share, bool),
-    (after, looks_like): (&str, Option<&str>),
+    share: &Share,
+    unusual: bool,
+    after: &str,
+    looks_like: Option<&str>,
     rivals: &[String],
 ) -> String {
-    let strength = if unusual { ", stronger than is plausible," } else { "" };
+    let strength = strength(unusual);
     let (verb, these) = match (facts.effects.len(), rivals.is_empty()) {
         (1, true) => ("explains", "it"),
         (_, true) => ("together explain", "them"),
@@ -155,7 +157,7 @@ fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> Str
         };
         facts.unproven.as_ref().map_or_else(String::new, unproven)
     } else {
-        let strength = if finding.implausible { ", stronger than is plausible," } else { "" };
+        let strength = strength(finding.implausible);
         let shrinks = if finding.confirmed {
             format!("shrinks it {} and leaves more than a cause does", facts.shrink.in_words())
         } else {
@@ -179,6 +181,10 @@ fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> Str
         size_and_place(facts),
         finding.times_noise()
     )
+}
+
+fn strength(implausible: bool) -> &'static str {
+    if implausible { ", stronger than is plausible," } else { "" }
 }
 
 /// `2.13 mrad RMS, largest in joint 2 (reversal)`.
@@ -240,18 +246,18 @@ mod tests {
     fn what_is_proven_is_said_with_what_stays() {
         let share = Share { value: 0.963, ci90: [0.94, 0.98] };
         let text =
-            in_part(&facts(&["command lag (lag 15.4 ms)"]), (&share, false), ("0.40 mrad RMS", Some("payload")), &[]);
+            in_part(&facts(&["command lag (lag 15.4 ms)"]), &share, false, "0.40 mrad RMS", Some("payload"), &[]);
         assert_eq!(
             text,
             "command lag (lag 15.4 ms) explains 96 % of the squared gap (94 % to 98 %), 2.13 mrad RMS, largest in joint 2 \
              (reversal): with it in the twin 0.40 mrad RMS stay on held-out clips, largest in yaw (after the slide); payload \
              explains most of that."
         );
-        let text = in_part(&facts(&["payload"]), (&share, true), ("1 mm", None), &[]);
+        let text = in_part(&facts(&["payload"]), &share, true, "1 mm", None, &[]);
         assert!(text.ends_with("no effect of the library explains much of that."), "{text}");
         assert!(text.starts_with("payload, stronger than is plausible, explains 96 %"), "{text}");
         let rivals = ["joint_coulomb_friction".to_owned()];
-        let text = in_part(&facts(&["load friction (0.44)"]), (&share, false), ("1 mm", None), &rivals);
+        let text = in_part(&facts(&["load friction (0.44)"]), &share, false, "1 mm", None, &rivals);
         assert!(text.starts_with("One of load friction (0.44), joint coulomb friction explains 96 %"), "{text}");
         assert!(
             text.contains("with the first in the twin 1 mm stay") && text.ends_with("cannot separate them."),

@@ -7,9 +7,8 @@ use super::measure::Measures;
 use super::reason::{Judged, reason};
 use crate::answer::diagnosis::{Candidate, Share, Status};
 use crate::diagnose::Kind;
-
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
+use crate::diagnose::fit::shortlist::TESTABLE;
 use crate::diagnose::fit::{parameters, time_step};
 use crate::diagnose::judge::gap::{Residuals, SHRINK_OF_A_DOUBLED_GAP};
 use crate::diagnose::judge::trial::{Found, Step, Trial};
@@ -33,10 +32,8 @@ pub(super) fn candidates<E: Evidence>(
     let (found, finding, seed) = (decided.found(case), &decided.finding, case.options.seed);
     let (before, after) = (&measures.without.left, decided.after(measures));
     let first = &found.steps[0];
-    let last_weights = &found.steps.last().unwrap_or(first).weights;
-    let time_step =
-        if found.last.effects.is_empty() { None } else { time_step::error(bench, &found.last, last_weights) };
-    let time_step = time_step.unwrap_or_default();
+    let last = found.steps.last().filter(|_| !found.last.effects.is_empty());
+    let time_step = last.and_then(|last| time_step::error(bench, &found.last, &last.weights)).unwrap_or_default();
     let believed = matches!(kind, Kind::Named | Kind::Class);
     let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
     let on_confirm = |fit: &Hypothesis, step: &Step| held_out::residuals(bench, split, fit, &step.weights);
@@ -50,7 +47,7 @@ pub(super) fn candidates<E: Evidence>(
         let kept = believed && found.last.effects.contains(&effect);
         let place = judged_in(found, effect, believed);
         let step = &found.steps[place];
-        let trial = step.trials.iter().find(|trial| trial.scored.candidate == effect).unwrap_or(trial);
+        let trial = step.trial(effect).unwrap_or(trial);
         let with = match &trial.fitted {
             _ if kept => after_keeping(found, &left, after, place),
             Some((fit, _)) => held_out::estimated(bench, split, fit, &step.weights),
@@ -62,7 +59,12 @@ pub(super) fn candidates<E: Evidence>(
         let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
         let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
         let hidden = is_hidden_by_the_arm(bench, step, trial);
-        let status = status(&trial.scored, kept, finding.rivals.contains(&name), (kind, hidden));
+        let status = match kind {
+            Kind::Named if kept => Status::Named,
+            Kind::Class if kept || finding.rivals.contains(&name) => Status::Possible,
+            _ if hidden || trial.scored.signal < TESTABLE => Status::NotTestable,
+            _ => Status::RuledOut,
+        };
         let times_noise = with.as_ref().map(|with| (with.mean_square() / with.floor()).sqrt());
         let judged = Judged { trial, place, beside: &beside, status, hidden, times_noise, kind, finding };
         Candidate {
@@ -106,10 +108,7 @@ fn is_hidden_by_the_arm<E: Evidence>(bench: &Bench<'_, E>, step: &Step, trial: &
 /// to the whole gap; where it was given none, as what an object shows while the arm's gap is open, beside what was believed
 /// in the end.
 fn judged_in(found: &Found, effect: usize, believed: bool) -> usize {
-    let of = |place: &usize| {
-        let trials = &found.steps[*place].trials;
-        trials.iter().find(|trial| trial.scored.candidate == effect).map(|trial| trial.fitted.is_some())
-    };
+    let of = |place: &usize| found.steps[*place].trial(effect).map(|trial| trial.fitted.is_some());
     let all_kept =
         |place: &usize| found.steps[*place].from.effects.iter().all(|other| found.last.effects.contains(other));
     let beside = || (0..found.steps.len()).rev().filter(|place| believed && all_kept(place));
@@ -119,15 +118,6 @@ fn judged_in(found: &Found, effect: usize, believed: bool) -> usize {
         .or_else(|| beside().find(|place| of(place) == Some(true)))
         .or_else(|| beside().find(|place| of(place).is_some()))
         .unwrap_or(0)
-}
-
-fn status(scored: &Scored, kept: bool, rival: bool, (kind, hidden): (Kind, bool)) -> Status {
-    match kind {
-        Kind::Named if kept => Status::Named,
-        Kind::Class if kept || rival => Status::Possible,
-        _ if hidden || scored.signal < TESTABLE => Status::NotTestable,
-        _ => Status::RuledOut,
-    }
 }
 
 fn confusable<E: Evidence>(first: &Step, effect: usize, overdispersion: f64, bench: &Bench<'_, E>) -> Vec<String> {
@@ -147,6 +137,7 @@ fn carried_over(shrink: &Share) -> &'static str {
 mod tests {
     use super::*;
     use crate::diagnose::fit::bench::Hypothesis;
+    use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::judge::score::Predicted;
 
     fn hypothesis(effects: &[usize]) -> Hypothesis {

@@ -12,26 +12,26 @@ use inference::likelihood::Evidence;
 
 /// A candidate with all that its reason is drawn from.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::diagnose) struct Judged<'a> {
+pub(super) struct Judged<'a> {
     /// The candidate in the step at [`Self::place`].
-    pub(in crate::diagnose) trial: &'a Trial,
+    pub(super) trial: &'a Trial,
     /// The step in which it is judged.
-    pub(in crate::diagnose) place: usize,
+    pub(super) place: usize,
     /// Effects that were in the twin then.
-    pub(in crate::diagnose) beside: &'a [&'a str],
+    pub(super) beside: &'a [&'a str],
     /// What became of it.
-    pub(in crate::diagnose) status: Status,
+    pub(super) status: Status,
     /// Whether it was not fitted because the arm's gap is open.
-    pub(in crate::diagnose) hidden: bool,
+    pub(super) hidden: bool,
     /// How many times what noise leaves the residuals of the confirm clips are with it, where it was fitted.
-    pub(in crate::diagnose) times_noise: Option<f64>,
+    pub(super) times_noise: Option<f64>,
     /// The verdict on the session.
-    pub(in crate::diagnose) kind: Kind,
+    pub(super) kind: Kind,
     /// What the verdict was drawn from.
-    pub(in crate::diagnose) finding: &'a Finding<'a>,
+    pub(super) finding: &'a Finding<'a>,
 }
 
-pub(in crate::diagnose) fn reason<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>) -> String {
+pub(super) fn reason<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>) -> String {
     let scored = &judged.trial.scored;
     let text = match (judged.status, &judged.trial.fitted) {
         (Status::NotTestable, _) if judged.hidden => {
@@ -68,11 +68,10 @@ fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>
     if finding.effects.contains(&name) {
         return nearest(judged);
     }
+    let gain = nats(advantage.nats, advantage.error);
     if advantage.nats <= 0.0 {
-        let gain = nats(advantage.nats, advantage.error);
         return format!("does not predict held-out clips better: log-likelihood changes by {gain}");
     }
-    let gain = nats(advantage.nats, advantage.error);
     let plain = trial.closes > LARGE_SHARE_CLOSED && advantage.in_nearly_all();
     if !EFFECTS.proves(advantage, cost) && !plain {
         let share = 100.0 * advantage.share;
@@ -145,8 +144,7 @@ fn leader<'a, E: Evidence>(
 ) -> Option<(&'a Trial, &'a Gain)> {
     let step = &found.steps[judged.place];
     let kept = found.kept().find(|(place, _)| *place == judged.place).map(|(_, effect)| effect);
-    let of = |effect| step.trials.iter().find(|trial| trial.scored.candidate == effect);
-    let trial = kept.and_then(of).or_else(|| step.best(bench).map(|(trial, ..)| trial))?;
+    let trial = kept.and_then(|effect| step.trial(effect)).or_else(|| step.best(bench).map(|(trial, ..)| trial))?;
     let (_, advantage) = trial.fitted.as_ref().filter(|_| trial.scored.candidate != judged.trial.scored.candidate)?;
     Some((trial, advantage))
 }

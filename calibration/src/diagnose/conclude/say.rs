@@ -7,7 +7,7 @@ use super::measure::Measures;
 use super::site::{Advice, Site};
 use super::{advice, ranked, remedies, verdict};
 use crate::answer::Trace;
-use crate::answer::diagnosis::{Change, Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Rest, Share, Verdict};
+use crate::answer::diagnosis::{Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Rest, Verdict};
 use crate::diagnose::criteria::CLASS_IS_RIGHT;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::localise::localise;
@@ -33,47 +33,23 @@ pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosi
     let next = advice::lacking(why, &site);
     // What was known before; nothing was found.
     let theta = options.theta.clone().unwrap_or_default();
-    Diagnosis { theta, ..empty(session, options, &site, (verdict::not_testable(why), next)) }
+    let gap = Gap { unit: "sigma", floor: NOISE_FLOOR, ..Gap::default() };
+    Diagnosis { gap, theta, ..about(session, options, &site, verdict::not_testable(why), next) }
 }
 
-/// An answer in which nothing was measured.
-fn empty(session: &Session, options: &Options, site: &Site, (verdict, next): (Verdict, Advice)) -> Diagnosis {
+/// A verdict on a session and what to record next, without what was measured.
+fn about(session: &Session, options: &Options, site: &Site, verdict: Verdict, next: Advice) -> Diagnosis {
     Diagnosis {
         verdict,
-        gap: Gap {
-            unit: "sigma",
-            before: 0.0,
-            after: 0.0,
-            floor: NOISE_FLOOR,
-            shrink: Share { value: 0.0, ci90: [0.0; 2] },
-            explainable_fraction: 0.0,
-            joint_rms_rad: Change::default(),
-            torque_rms: None,
-            object_add_m: Change::default(),
-            object_add_s_m: Change::default(),
-            sensors: Vec::new(),
-        },
-        nearest: None,
-        stage_test: None,
-        places: Vec::new(),
-        candidates: Vec::new(),
         next_experiment: next.sentence,
         next_commands: next.commands,
         next_motions: next.motions.into_iter().map(NextMotion::new).collect(),
-        remedies: Vec::new(),
-        clips: Clips::default(),
-        warnings: Vec::new(),
-        budget_spent: false,
-        engine: None,
-        seconds: 0.0,
         object: session.cell.one_of_several().map(str::to_owned),
         session: session.folder.display().to_string(),
         origin: site.origin().to_owned(),
         files: session.files.clone(),
         seed: options.seed,
-        theta: Theta::default(),
-        theta_file: None,
-        traces: Vec::new(),
+        ..Diagnosis::default()
     }
 }
 
@@ -92,7 +68,7 @@ pub(super) fn say<E: Evidence>(
     let fits_and_left = ([&measures.without.fits, shown.fits], [before, shown.left]);
     let sizes = Sizes::of(bench, fits_and_left, session, admitted)?;
     let open = not_proven(case, decided, before);
-    let (verdict, rest) = verdict_of(case, &measures, decided, (&sizes, open.as_ref()));
+    let (verdict, rest) = verdict_of(case, &measures, decided, &sizes, open.as_ref());
     let site = Site::of(session, options.report.as_deref());
     let next = match &open {
         Some((open, _)) if verdict.kind == Kind::Unexplained => advice::proving(open.effect(bench), open.more, &site),
@@ -108,13 +84,9 @@ pub(super) fn say<E: Evidence>(
     let object = known.and_then(|known| known.object.clone());
     let traced = if nearest.is_some() { after } else { shown.left };
     let remedies = remedies::of(&verdict, &theta, &session.cell);
-    let (gap, candidates) = (
-        sizes.gap(([before, shown.left], measures.sensors.clone()), options.seed),
-        ranked::candidates(case, &measures, decided, verdict.kind),
-    );
     Ok(Diagnosis {
-        gap,
-        candidates,
+        gap: sizes.gap(([before, shown.left], measures.sensors.clone()), options.seed),
+        candidates: ranked::candidates(case, &measures, decided, verdict.kind),
         remedies,
         clips: clips(admitted, case.split),
         warnings: warnings(case, &shown.hypothesis.full, &shown.hypothesis.effects),
@@ -122,7 +94,7 @@ pub(super) fn say<E: Evidence>(
         traces: traces(bench.evidence, [before, traced], admitted),
         nearest,
         places: measures.without.places,
-        ..empty(session, options, &site, (verdict, next))
+        ..about(session, options, &site, verdict, next)
     })
 }
 
@@ -131,7 +103,8 @@ fn verdict_of<E: Evidence>(
     case: &Case<'_, E>,
     measures: &Measures,
     decided: &Decided<'_>,
-    (sizes, open): (&Sizes, Option<&(Unproven<'_>, f64)>),
+    sizes: &Sizes,
+    open: Option<&(Unproven<'_>, f64)>,
 ) -> (Verdict, Vec<Place>) {
     let places = &measures.without.places;
     let rest = match &decided.partly {
@@ -156,7 +129,7 @@ fn verdict_of<E: Evidence>(
         shrink: measures.confirmation.shrink,
     };
     let verdict = match &decided.partly {
-        Some(partly) => in_part(case, partly, &facts, (&stays, sizes)),
+        Some(partly) => in_part(case, partly, &facts, &stays, sizes),
         None => decided.decision.clone().said(headline::sentence(&decided.decision, &decided.finding, &facts)),
     };
     (verdict, rest)
@@ -216,10 +189,10 @@ fn few(admitted: &Admitted, split: &Split) -> Option<String> {
 }
 
 /// The verdict where what was found is proven, but a part of the gap stays: so much of the joints [rad] and the object [m].
-fn in_part<E: Evidence>(case: &Case<'_, E>, partly: &Partly, facts: &Facts, (stays, sizes): (&str, &Sizes)) -> Verdict {
+fn in_part<E: Evidence>(case: &Case<'_, E>, partly: &Partly, facts: &Facts, stays: &str, sizes: &Sizes) -> Verdict {
     let looks_like = partly.looks_like(case.bench);
     let [own, rivals] = partly.effects(case.bench);
-    let text = headline::in_part(facts, (&partly.share, partly.unusual), (stays, looks_like), &rivals);
+    let text = headline::in_part(facts, &partly.share, partly.unusual, stays, looks_like, &rivals);
     let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
     let (kind, confidence) =
         if rivals.is_empty() { (Kind::Named, sureness(&partly.found)) } else { (Kind::Class, CLASS_IS_RIGHT.value) };
@@ -264,7 +237,7 @@ fn traces(evidence: &impl Evidence, [before, after]: [&Residuals; 2], admitted: 
         }
     }
     sized.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let trace = |(_, place, channel): (f64, usize, usize)| {
+    let trace = |place: usize, channel: usize| {
         let (clip, info) = (before.clips[place].0, &evidence.channels()[channel]);
         let points = |residuals: &[f64]| {
             let rows = evidence.rows(clip).iter().zip(residuals).filter(|(row, _)| row.channel == channel);
@@ -280,5 +253,5 @@ fn traces(evidence: &impl Evidence, [before, after]: [&Residuals; 2], admitted: 
             after: points(&after.clips[place].1),
         }
     };
-    sized.into_iter().take(SHOWN_TRACES).map(trace).collect()
+    sized.into_iter().take(SHOWN_TRACES).map(|(_, place, channel)| trace(place, channel)).collect()
 }

@@ -31,11 +31,10 @@ pub struct Advice {
     pub motions: Vec<ArmMotion>,
 }
 
-/// What records something: commands, or motions where no bridge drives the arm.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::diagnose) struct Steps {
-    commands: Vec<String>,
-    motions: Vec<ArmMotion>,
+impl Advice {
+    fn of(sentence: String) -> Self {
+        Self { sentence, ..Self::default() }
+    }
 }
 
 /// A capture of an advice, without cell and session.
@@ -96,18 +95,10 @@ impl Site {
         let provenance = Provenance::of(session);
         let (origin, (arm, goes_on)) = (provenance.to_string(), arm_of(session, &provenance));
         if session.files.cell.is_some() || !goes_on || arm.is_none() {
-            let folder = named_after(&session.folder, "next");
             let beside = Self::new(&session.folder, strokes, Vec::new(), 1.0).cell;
             let cell = session.files.cell.clone().unwrap_or(beside);
-            return Self {
-                arm,
-                origin,
-                cell,
-                is_new: true,
-                alone,
-                torques,
-                ..Self::new(&folder, strokes, Vec::new(), 1.0)
-            };
+            let next = Self::new(&named_after(&session.folder, "next"), strokes, Vec::new(), 1.0);
+            return Self { arm, origin, cell, is_new: true, alone, torques, ..next };
         }
         let kind = if strokes { ClipKind::ControlHitSlide } else { ClipKind::Excitation };
         let (mut clips, mut fastest) = (Vec::new(), 1.0);
@@ -115,15 +106,15 @@ impl Site {
             let of = (kind, session.cell.object_name());
             let numbers =
                 session.clips.iter().filter(|clip| clip.kind == kind).filter_map(|clip| number_of(&clip.file));
-            for number in numbers.take(2 * CLIPS_REPEATED) {
-                let Ok(clip) = recorded::read(&session.folder, number, of, &body) else { continue };
+            // A clip that cannot be read again may be followed by one that can; not all of a long session are tried.
+            let read = numbers.take(2 * CLIPS_REPEATED).filter_map(|number| {
+                Some((number, recorded::read(&session.folder, number, of, &body).ok()?.set_points))
+            });
+            for (number, set_points) in read.take(CLIPS_REPEATED) {
                 if clips.is_empty() {
-                    fastest = pace::largest(&clip.set_points, &limits::of(&session.cell, &body), &body);
+                    fastest = pace::largest(&set_points, &limits::of(&session.cell, &body), &body);
                 }
                 clips.push(number);
-                if clips.len() == CLIPS_REPEATED {
-                    break;
-                }
             }
         }
         Self { arm, origin, alone, torques, ..Self::new(&session.folder, strokes, clips, fastest) }
@@ -168,14 +159,14 @@ impl Site {
     /// The sentence with the commands of `captures`, and what diagnoses them.
     pub(in crate::diagnose) fn advice(&self, sentence: String, captures: &[Capture]) -> Advice {
         if self.alone {
-            return Advice { sentence, ..Advice::default() };
+            return Advice::of(sentence);
         }
         if self.arm.is_none() {
             let motions = captures.iter().filter_map(|capture| match capture {
                 Capture::Arm(motion) => Some(*motion),
                 _ => None,
             });
-            return self.finished(sentence, Steps { motions: motions.collect(), ..Steps::default() });
+            return self.finished(Advice { motions: motions.collect(), ..Advice::of(sentence) });
         }
         let mut commands = Vec::new();
         // A session begins with clips enough to be diagnosed.
@@ -197,11 +188,16 @@ impl Site {
                 self.strokes_into(&cell, &named_after(&self.folder, name), rest)
             }
         }));
-        self.finished(sentence, Steps { commands, ..Steps::default() })
+        self.finished(Advice { commands, ..Advice::of(sentence) })
     }
 
-    /// Repeats: the words for it and the commands. Of eight only one clip is repeated, of two both.
-    pub(in crate::diagnose) fn again(&self, times: usize) -> (String, Steps) {
+    /// Repeats, what they are in words as `sentence` puts them. Of eight only one clip is repeated, of two both.
+    pub(in crate::diagnose) fn again(&self, times: usize, sentence: impl FnOnce(String) -> String) -> Advice {
+        let repeats = self.repeats(times);
+        self.finished(Advice { sentence: sentence(repeats.sentence), ..repeats })
+    }
+
+    fn repeats(&self, times: usize) -> Advice {
         let fast = (100.0 * self.fastest.min(FAST_ENOUGH)).floor() / 100.0;
         let speeds = match fast {
             fast if fast >= FAST_ENOUGH => "one at half and one at twice the speed".to_owned(),
@@ -212,16 +208,14 @@ impl Site {
         };
         let what = if times > CLIPS_REPEATED { "repeat one clip eight times" } else { "repeat two clips" };
         if self.alone {
-            return (
-                format!("let the object go {times} times more, in other directions and at other speeds"),
-                Steps::default(),
-            );
+            let words = format!("let the object go {times} times more, in other directions and at other speeds");
+            return Advice::of(words);
         }
         let Some(first) = self.clips.first() else {
             let words =
                 format!("record {times} clips more, and {}", speeds.replace("one at half and", "some at half and"));
             let usual = ArmMotion::of(Kind::Multisine, times);
-            return (words, self.steps(&[usual, ArmMotion { speed: 0.5, ..ArmMotion::of(Kind::Multisine, 2) }]));
+            return self.new_clips(words, &[usual, ArmMotion { speed: 0.5, ..ArmMotion::of(Kind::Multisine, 2) }]);
         };
         let all: Vec<String> = self.clips.iter().take(CLIPS_REPEATED).map(ToString::to_string).collect();
         let repeated = if times > CLIPS_REPEATED {
@@ -233,25 +227,27 @@ impl Site {
         if fast >= WORTH_PLAYING_FASTER {
             commands.push(self.same(&format!("--repeat {first} --speed {fast}")));
         }
-        (format!("{what} and add {speeds}"), Steps { commands, ..Steps::default() })
+        Advice { commands, ..Advice::of(format!("{what} and add {speeds}")) }
     }
 
-    /// New clips of the session's kind: sums of sines of the arm alone, or as many strokes.
-    fn steps(&self, motions: &[ArmMotion]) -> Steps {
+    /// The sentence with new clips of the session's kind: sums of sines of the arm alone, or as many strokes.
+    fn new_clips(&self, sentence: String, motions: &[ArmMotion]) -> Advice {
+        let advice = Advice::of(sentence);
         match &self.arm {
             Some(_) => {
-                let commands = motions.iter().map(|motion| self.same(&motion.arguments())).collect();
-                Steps { commands, ..Steps::default() }
+                Advice { commands: motions.iter().map(|motion| self.same(&motion.arguments())).collect(), ..advice }
             }
-            None if self.strokes => Steps::default(),
-            None => Steps { motions: motions.to_vec(), ..Steps::default() },
+            None if self.strokes => advice,
+            None => Advice { motions: motions.to_vec(), ..advice },
         }
     }
 
     /// The sentence with the command of so many clips more of the same kind.
     pub(in crate::diagnose) fn more(&self, sentence: String, clips: usize) -> Advice {
-        let steps = if self.alone { Steps::default() } else { self.steps(&[ArmMotion::of(Kind::Multisine, clips)]) };
-        self.finished(sentence, steps)
+        if self.alone {
+            return Advice::of(sentence);
+        }
+        self.finished(self.new_clips(sentence, &[ArmMotion::of(Kind::Multisine, clips)]))
     }
 
     /// Another session of the same kind.
@@ -267,9 +263,8 @@ impl Site {
         }]
     }
 
-    /// The sentence with commands, and after them what diagnoses the sessions they record into.
-    pub(in crate::diagnose) fn finished(&self, sentence: String, steps: Steps) -> Advice {
-        let Steps { mut commands, motions } = steps;
+    /// The same, and after its commands what diagnoses the sessions they record into.
+    fn finished(&self, Advice { sentence, mut commands, motions }: Advice) -> Advice {
         if self.arm.is_none() && !self.alone {
             let sentence = format!(
                 "{sentence} No bridge drives this arm: play the motions with its own controller, log commands and \

@@ -103,7 +103,8 @@ fn a_clip_that_lies_where_the_program_runs_has_a_folder_too() {
 
 #[test]
 fn where_nothing_can_be_repeated_new_clips_take_its_place() {
-    let (words, Steps { commands, .. }) = Site::new(Path::new("bags"), false, Vec::new(), 1.0).again(2);
+    let Advice { sentence: words, commands, .. } =
+        Site::new(Path::new("bags"), false, Vec::new(), 1.0).again(2, |words| words);
     assert!(words.starts_with("record 2 clips more"), "{words}");
     assert!(commands[0].ends_with("--clips 2") && commands[1].ends_with("--speed 0.5"), "{commands:?}");
 }
