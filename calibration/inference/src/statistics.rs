@@ -1,8 +1,13 @@
-//! Quantiles of distributions, the one place of each; medians are those of [`shared_mem::statistics`].
+//! Quantiles of distributions and the extent of values, the one place of each; medians are those of [`shared_mem::statistics`].
 
 pub use shared_mem::statistics::median;
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, Normal, StudentsT};
+
+/// The lowest and the highest of some values; of none the lowest is infinite.
+pub fn extent(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    values.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+}
 
 /// Half the interval that holds `level` of a normal distribution [sigmas].
 pub fn normal(level: f64) -> f64 {

@@ -6,7 +6,7 @@ use crate::identify::finding::Finding;
 use crate::identify::run::Optimizer;
 use crate::identify::used::Used;
 use inference::likelihood::Setting;
-
+use inference::statistics::extent;
 use twin::effects::{Robot, find};
 
 /// A gain whose 95 % interval is wider than this share of it, to either side, is not identifiable (a choice).
@@ -100,8 +100,8 @@ fn commanded(joint: usize, model: &Model<'_>, clips: &Used) -> f64 {
     let travel = |clip: &usize| {
         let desired = &model.clip(*clip).recorded.desired;
         let values = desired.q.iter().skip(joint).step_by(desired.dof.max(1));
-        let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), q| (lo.min(*q), hi.max(*q)));
-        hi - lo
+        let [low, high] = extent(values.copied());
+        high - low
     };
     clips.split.train.iter().map(travel).fold(0.0, f64::max)
 }

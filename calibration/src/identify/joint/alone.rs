@@ -2,7 +2,7 @@
 //! earliest row on from which friction and weight alone explain it until it rests or runs into something.
 
 use super::agreement::disagreement;
-use super::model::{Motion, best_fit};
+use super::model::{Line, Motion, best_fit, travel};
 use super::noise::Noise;
 use super::positions::Positions;
 use std::ops::Range;
@@ -28,9 +28,9 @@ const PUSH_FACTOR: f64 = 16.0;
 pub(super) const MIN_KEPT_TRAVEL: f64 = 0.5;
 /// A part runs into something if it is faster than this share of its highest speed before its last rows (a choice).
 const IMPACT_SPEED_SHARE: f64 = 0.25;
-/// Ends and beginnings that are tried.
+/// Ends and beginnings that are tried, of one motion and then of all together (choices).
 const TRIED_ENDS: usize = 12;
-const TRIED_BEGINNINGS: usize = 24;
+pub(super) const TRIED_BEGINNINGS: usize = 24;
 /// A part's frame and the joint's law are not exact: residuals of this share of the travel count as noise (a choice).
 const MODEL_ERROR_SHARE: f64 = 1e-3;
 
@@ -45,8 +45,7 @@ pub(super) struct Alone {
 pub(super) fn motions(clip: &Positions, joint: &LoneJoint, noise: &Noise) -> Vec<Alone> {
     let moving = moving(clip, noise);
     let starts = moving.iter().skip(1).map(|next| next.start).chain([clip.times.len()]);
-    let of = |(rows, next): (&Range<usize>, usize)| last_free(clip, (joint, noise), rows, next);
-    moving.iter().zip(starts).filter_map(of).collect()
+    moving.iter().zip(starts).filter_map(|(rows, next)| last_free(clip, joint, noise, rows, next)).collect()
 }
 
 /// Mean position of each stretch in which the part rests for a while [rad or m].
@@ -54,42 +53,31 @@ pub(super) fn rests(clip: &Positions, noise: &Noise) -> Vec<f64> {
     let moving = moving(clip, noise);
     let ends = std::iter::once(0).chain(moving.iter().map(|rows| rows.end));
     let starts = moving.iter().map(|rows| rows.start).chain([clip.times.len()]);
-    let rest = |(from, to): (usize, usize)| {
-        let rows = (from + SLOPE_ROWS[0])..to.saturating_sub(SLOPE_ROWS[0]);
-        let lasts = rows.len() > SLOPE_ROWS[0] && clip.times[rows.end - 1] - clip.times[rows.start] >= REST_SECONDS;
-        lasts.then(|| clip.positions[rows.clone()].iter().sum::<f64>() / rows.len() as f64)
+    let rest = ends.zip(starts).map(|(from, to)| (from + SLOPE_ROWS[0])..to.saturating_sub(SLOPE_ROWS[0]));
+    let lasts = |rows: &Range<usize>| {
+        rows.len() > SLOPE_ROWS[0] && clip.times[rows.end - 1] - clip.times[rows.start] >= REST_SECONDS
     };
-    ends.zip(starts).filter_map(rest).collect()
+    rest.filter(lasts).map(|rows| clip.positions[rows.clone()].iter().sum::<f64>() / rows.len() as f64).collect()
 }
 
-/// Slopes of lines through neighbouring rows [rad/s or m/s], and their standard deviations for positions of one.
-fn velocities(clip: &Positions, around: usize) -> Vec<[f64; 2]> {
-    let last = clip.times.len() - 1;
-    let slope = |row: usize| {
-        let rows = row.saturating_sub(around)..=(row + around).min(last);
-        let count = rows.clone().count() as f64;
-        let mean = |of: &[f64]| rows.clone().map(|k| of[k]).sum::<f64>() / count;
-        let (t, q) = (mean(&clip.times), mean(&clip.positions));
-        let along: f64 = rows.clone().map(|k| (clip.times[k] - t).powi(2)).sum();
-        let with: f64 = rows.clone().map(|k| (clip.times[k] - t) * (clip.positions[k] - q)).sum();
-        if along > 0.0 { [with / along, along.sqrt().recip()] } else { [0.0, f64::INFINITY] }
-    };
-    (0..=last).map(slope).collect()
+/// Lines through the neighbouring rows of each, so many to each side: their slopes are velocities [rad/s or m/s].
+fn lines(clip: &Positions, around: usize) -> Vec<Line> {
+    let count = clip.times.len();
+    let neighbours = |row: usize| row.saturating_sub(around)..(row + around + 1).min(count);
+    (0..count).map(neighbours).map(|rows| Line::through(&clip.times[rows.clone()], &clip.positions[rows])).collect()
 }
 
 /// Noise of a clip's positions, with what the joint's law leaves.
 fn sigma(clip: &Positions, noise: &Noise) -> f64 {
-    let [low, high] =
-        clip.positions.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(*q), high.max(*q)]);
-    noise.sigma.hypot(MODEL_ERROR_SHARE * (high - low))
+    noise.sigma.hypot(MODEL_ERROR_SHARE * travel(&clip.positions))
 }
 
 /// Stretches in which the part moves.
 fn moving(clip: &Positions, noise: &Noise) -> Vec<Range<usize>> {
     // Slopes are as noisy as noise that lasts makes them.
     let least = MOVING_SIGMAS * sigma(clip, noise) * noise.lasts().sqrt();
-    let by_scale = SLOPE_ROWS.map(|around| velocities(clip, around));
-    let moves = |row: usize| by_scale.iter().any(|all| all[row][0].abs() > least * all[row][1]);
+    let by_scale = SLOPE_ROWS.map(|around| lines(clip, around));
+    let moves = |row: usize| by_scale.iter().any(|lines| lines[row].is_steeper(least));
     let mut found: Vec<Range<usize>> = Vec::new();
     for row in (0..clip.times.len()).filter(|row| moves(*row)) {
         match found.last_mut() {
@@ -101,47 +89,44 @@ fn moving(clip: &Positions, noise: &Noise) -> Vec<Range<usize>> {
 }
 
 /// The stretch at the end of a motion that friction and weight explain and in which the part goes farthest.
-fn last_free(clip: &Positions, law: (&LoneJoint, &Noise), rows: &Range<usize>, next: usize) -> Option<Alone> {
-    let sigma = sigma(clip, law.1) * law.1.lasts().sqrt();
+fn last_free(clip: &Positions, joint: &LoneJoint, noise: &Noise, rows: &Range<usize>, next: usize) -> Option<Alone> {
+    let least = MOVING_SIGMAS * sigma(clip, noise) * noise.lasts().sqrt();
     // Few rows show best when it stops; where they are too noisy for that, more.
-    let seen = SLOPE_ROWS.iter().find_map(|around| {
-        let velocities = velocities(clip, *around);
-        let fastest = rows.clone().max_by(|a, b| velocities[*a][0].abs().total_cmp(&velocities[*b][0].abs()))?;
-        let [velocity, deviation] = velocities[fastest];
-        (END_SPEED_SHARE * velocity.abs() > MOVING_SIGMAS * sigma * deviation).then_some((
-            *around,
-            velocities,
-            velocity.abs(),
-        ))
-    });
-    let (around, velocities, fastest) = seen?;
-    let over = rows.clone().rev().find(|row| velocities[*row][0].abs() >= END_SPEED_SHARE * fastest)?;
+    let (around, lines) = SLOPE_ROWS.into_iter().map(|around| (around, lines(clip, around))).find(|(_, lines)| {
+        fastest_in(lines, rows.clone()).is_some_and(|row| lines[row].is_steeper(least / END_SPEED_SHARE))
+    })?;
+    let fastest = lines[fastest_in(&lines, rows.clone())?].slope.abs();
+    let over = rows.clone().rev().find(|row| lines[*row].slope.abs() >= END_SPEED_SHARE * fastest)?;
     let first_end = (over + 1).saturating_sub(around).max(rows.start + MIN_ROWS);
     let rested = (rows.end..next).take_while(|row| clip.times[*row] - clip.times[rows.end - 1] <= REST_SECONDS).count();
     let last_end = (rows.end + rested).min(next.saturating_sub(around)).max(rows.end);
     let mut best: Option<Alone> = None;
     for end in steps(last_end, first_end, TRIED_ENDS) {
         for start in steps(rows.start, end.saturating_sub(MIN_ROWS), TRIED_BEGINNINGS) {
-            let motion = cut(clip, law, start..end);
+            let motion = cut(clip, joint, noise, start..end);
             let least = best.as_ref().map_or(MIN_TRAVEL_SIGMAS * motion.sigma, |best| best.motion.travel());
             // Later beginnings leave less.
             if rows.end.min(end) < start + MIN_ROWS || motion.travel() <= least {
                 break;
             }
-            if explains(&motion, law.1) {
+            if explains(&motion, noise) {
                 best = Some(Alone { rows: start..end, motion });
                 break;
             }
         }
     }
     let best = best?.before_impact(fastest);
-    let peak = (rows.start..=over).max_by(|a, b| velocities[*a][0].abs().total_cmp(&velocities[*b][0].abs()))?;
+    let peak = fastest_in(&lines, rows.start..over + 1)?;
     let pushed = clip.times[peak] - clip.times[rows.start.saturating_sub(1)];
-    let unseen = (PUSH_FACTOR * law.1.sigma / fastest * pushed).sqrt();
+    let unseen = (PUSH_FACTOR * noise.sigma / fastest * pushed).sqrt();
     let cut = best.motion.times.iter().take_while(|time| **time < unseen).count();
     // No more than half of the way is given up.
     let kept = (0..=cut).rev().filter_map(|rows| best.without_first(rows));
     kept.into_iter().find(|shorter| shorter.motion.travel() >= MIN_KEPT_TRAVEL * best.motion.travel())
+}
+
+fn fastest_in(lines: &[Line], rows: Range<usize>) -> Option<usize> {
+    rows.max_by(|a, b| lines[*a].slope.abs().total_cmp(&lines[*b].slope.abs()))
 }
 
 /// Rows from one to another, both included, in at most so many steps.
@@ -154,7 +139,7 @@ fn steps(from: usize, to: usize, most: usize) -> Vec<usize> {
     all
 }
 
-fn cut(clip: &Positions, (joint, noise): (&LoneJoint, &Noise), rows: Range<usize>) -> Motion {
+fn cut(clip: &Positions, joint: &LoneJoint, noise: &Noise, rows: Range<usize>) -> Motion {
     let times = clip.times[rows.clone()].iter().map(|time| time - clip.times[rows.start]).collect();
     let mut motion = Motion { times, positions: clip.positions[rows].to_vec(), sigma: noise.sigma, joint: *joint };
     motion.sigma = noise.sigma.hypot(MODEL_ERROR_SHARE * motion.travel());
@@ -169,29 +154,25 @@ fn explains(motion: &Motion, noise: &Noise) -> bool {
 
 impl Alone {
     /// Without its last rows where the part ran into something while it was moving: they may show what it did there.
-    fn before_impact(self, fastest: f64) -> Self {
-        let Motion { times, positions, .. } = &self.motion;
+    fn before_impact(mut self, fastest: f64) -> Self {
+        let Motion { times, positions, .. } = &mut self.motion;
         let last = times.len() - 1;
         let [before, behind] = [last.saturating_sub(2 * SLOPE_ROWS[0]), last.saturating_sub(SLOPE_ROWS[0])];
         let speed = (positions[behind] - positions[before]).abs() / (times[behind] - times[before]).max(1e-9);
-        if speed < IMPACT_SPEED_SHARE * fastest || last <= MIN_ROWS {
-            return self;
+        if speed >= IMPACT_SPEED_SHARE * fastest && last > MIN_ROWS {
+            self.rows.end -= SLOPE_ROWS[0];
+            times.truncate(last + 1 - SLOPE_ROWS[0]);
+            positions.truncate(last + 1 - SLOPE_ROWS[0]);
         }
-        let mut shorter = self;
-        shorter.rows.end -= SLOPE_ROWS[0];
-        shorter.motion.times.truncate(last + 1 - SLOPE_ROWS[0]);
-        shorter.motion.positions.truncate(last + 1 - SLOPE_ROWS[0]);
-        shorter
+        self
     }
 
     /// The same without some rows at its beginning; `None` where too few would be left.
     pub(super) fn without_first(&self, rows: usize) -> Option<Self> {
-        let Motion { times, positions, sigma, joint } = &self.motion;
-        if times.len() < rows + MIN_ROWS {
-            return None;
-        }
-        let times = times[rows..].iter().map(|time| time - times[rows]).collect();
-        let motion = Motion { times, positions: positions[rows..].to_vec(), sigma: *sigma, joint: *joint };
+        let Motion { times, positions, .. } = &self.motion;
+        let first = times.get(rows).filter(|_| times.len() >= rows + MIN_ROWS)?;
+        let times = times[rows..].iter().map(|time| time - first).collect();
+        let motion = Motion { times, positions: positions[rows..].to_vec(), ..self.motion };
         Some(Self { rows: self.rows.start + rows..self.rows.end, motion })
     }
 }

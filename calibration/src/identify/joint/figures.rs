@@ -19,16 +19,15 @@ const BEYOND_NOISE: f64 = 1.5;
 /// `before` are the motions with what the URDF says, `held_out` each with what the others say.
 pub(super) fn answer(
     material: &Material,
-    (motions, found): (&[Motion], &Found),
+    motions: &[Motion],
+    found: &Found,
     before: &[ClipFit],
     held_out: Option<&[ClipFit]>,
 ) -> Identification {
     let slides = material.subject.joint.slides;
     let rms = |fits: &[ClipFit], motions: &[Motion]| {
-        let (sum, rows) = fits
-            .iter()
-            .zip(motions)
-            .fold((0.0, 0), |(sum, rows), (fit, motion)| (sum + fit.chi2 * motion.sigma.powi(2), rows + fit.rows));
+        let rows: usize = fits.iter().map(|fit| fit.rows).sum();
+        let sum: f64 = fits.iter().zip(motions).map(|(fit, motion)| fit.chi2 * motion.sigma.powi(2)).sum();
         figures(slides, (sum / rows.max(1) as f64).sqrt())
     };
     let [old, new] = [before, &found.fit.clips].map(|fits| rms(fits, motions));

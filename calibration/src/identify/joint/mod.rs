@@ -34,7 +34,7 @@ use fit::{Found, held_out, scored};
 use inference::admit::remarks::reasons;
 use inference::admit::{LeftOut, Looked, Usable};
 use inference::interrupt::Interrupt;
-use model::Motion;
+use model::{Motion, travel};
 use noise::Noise;
 use positions::Positions;
 use rayon::prelude::*;
@@ -140,7 +140,7 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     let held_out = held_out(&motions);
     bar.show(3, "answer");
     go_on()?;
-    let mut answer = figures::answer(&material, (&motions, &found), &before, held_out.as_deref());
+    let mut answer = figures::answer(&material, &motions, &found, &before, held_out.as_deref());
     answer.session = session.folder.display().to_string();
     answer.files = session.files.clone();
     if let Some(out) = &options.out {
@@ -176,15 +176,10 @@ impl OfClip {
     }
 
     fn why_none(&self) -> String {
-        let [low, high] = self
-            .clip
-            .positions
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(*q), high.max(*q)]);
         format!(
             "moves by {:.2} in all, and no stretch at the end of a motion is long enough that friction and weight alone explain: let go \
              of the part while it moves",
-            high - low
+            travel(&self.clip.positions)
         )
     }
 }

@@ -3,6 +3,7 @@
 //! Each motion has its own start, position and velocity, which its rows alone say: eliminated with priors so wide that they say nothing.
 
 use inference::estimate::{ClipModel, Fit, Impossible, Place, Random, Schedule, Unknown, fit_from};
+use inference::statistics::extent;
 use twin::world::LoneJoint;
 
 /// Prior scatter of a motion's start, one sigma in those of its noise [1]: so wide that it says nothing (a choice).
@@ -15,6 +16,36 @@ const FRICTION_STEP: f64 = 1e-3;
 /// Witnesses of the intervals in a motion: what residuals of neighbouring rows share, by noise that lasts or a law that is not quite
 /// theirs, counts once (a choice).
 const WITNESSES: usize = 5;
+
+/// The line through some positions: its slope, and the standard deviation of that for positions of one; none through one moment.
+pub(super) struct Line {
+    /// Mean of the times, and of the positions.
+    middle: [f64; 2],
+    pub(super) slope: f64,
+    pub(super) deviation: f64,
+}
+
+impl Line {
+    pub(super) fn through(times: &[f64], positions: &[f64]) -> Self {
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let (t, q) = (mean(times), mean(positions));
+        let along: f64 = times.iter().map(|time| (time - t).powi(2)).sum();
+        let with: f64 = times.iter().zip(positions).map(|(time, position)| (time - t) * (position - q)).sum();
+        let (slope, deviation) = if along > 0.0 { (with / along, along.sqrt().recip()) } else { (0.0, f64::INFINITY) };
+        Self { middle: [t, q], slope, deviation }
+    }
+
+    /// Whether the slope is more than noise of `sigma` makes it so many standard deviations long.
+    pub(super) fn is_steeper(&self, sigma: f64) -> bool {
+        self.slope.abs() > sigma * self.deviation
+    }
+}
+
+/// From the lowest of some values to the highest.
+pub(super) fn travel(values: &[f64]) -> f64 {
+    let [low, high] = extent(values.iter().copied());
+    high - low
+}
 
 /// A part that moves by itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,11 +70,7 @@ impl Motion {
 
     /// From the lowest position to the highest [rad or m].
     pub(super) fn travel(&self) -> f64 {
-        let [low, high] = self
-            .positions
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(*q), high.max(*q)]);
-        high - low
+        travel(&self.positions)
     }
 
     /// Mean time between rows [s].
@@ -54,13 +81,8 @@ impl Motion {
     /// Where a fit of its start begins: a line through its first rows.
     fn start(&self) -> [f64; 2] {
         let rows = (self.times.len() / 8).max(ROWS_OF_A_START).min(self.times.len());
-        let (times, positions) = (&self.times[..rows], &self.positions[..rows]);
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / rows as f64;
-        let (t, q) = (mean(times), mean(positions));
-        let along: f64 = times.iter().map(|time| (time - t).powi(2)).sum();
-        let with: f64 = times.iter().zip(positions).map(|(time, position)| (time - t) * (position - q)).sum();
-        let velocity = if along > 0.0 { with / along } else { 0.0 };
-        [q - velocity * t, velocity]
+        let Line { middle: [t, q], slope, .. } = Line::through(&self.times[..rows], &self.positions[..rows]);
+        [q - slope * t, slope]
     }
 
     /// Positions with this friction and damping, and a start that lies so far from [`Self::start`], in sigmas.

@@ -2,14 +2,12 @@
 //! the others do not explain.
 
 use super::agreement::disagreement;
-use super::alone::{Alone, MIN_KEPT_TRAVEL};
+use super::alone::{Alone, MIN_KEPT_TRAVEL, TRIED_BEGINNINGS};
 use super::fit::held_out;
 use super::model::{Motion, best_fit};
 use super::noise::Noise;
 use inference::estimate::Fit;
 
-/// Cuts of a motion's beginning, each by the same number of rows.
-const CUTS_PER_MOTION: usize = 24;
 /// A motion from which the others lead farther away than this share of its travel is none of the same joint by itself (a choice).
 const MAX_DISAGREEMENT: f64 = 0.1;
 
@@ -18,13 +16,13 @@ const MAX_DISAGREEMENT: f64 = 0.1;
 pub(super) fn cut_to_agree(motions: &mut [Alone], noise: &Noise) {
     let whole = motions.to_vec();
     let mut stays = vec![false; motions.len()];
-    for _ in 0..CUTS_PER_MOTION * motions.len() {
+    for _ in 0..TRIED_BEGINNINGS * motions.len() {
         let all: Vec<Motion> = motions.iter().map(|alone| alone.motion.clone()).collect();
         let Some(fit) = best_fit(&all) else { return };
         let off = |k: &usize| of(&fit, *k, &motions[*k].motion, noise);
         let worst = (0..motions.len()).filter(|k| !stays[*k]).max_by(|a, b| off(a).total_cmp(&off(b)));
         let Some(worst) = worst.filter(|k| off(k) > 1.0) else { return };
-        let step = whole[worst].rows.len().div_ceil(CUTS_PER_MOTION);
+        let step = whole[worst].rows.len().div_ceil(TRIED_BEGINNINGS);
         let shorter = motions[worst].without_first(step);
         match shorter.filter(|shorter| shorter.motion.travel() >= MIN_KEPT_TRAVEL * whole[worst].motion.travel()) {
             Some(shorter) => motions[worst] = shorter,

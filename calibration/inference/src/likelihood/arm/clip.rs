@@ -3,6 +3,7 @@
 
 use super::velocity;
 use crate::likelihood::object::noise_of;
+use crate::statistics::extent;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::recording::{Clip, JointSeries, ReadError};
@@ -275,8 +276,8 @@ fn clock_jump(measured: &JointSeries, step_ns: u64) -> Option<usize> {
 /// Distance between the lowest and highest value of a joint.
 fn travel(series: &JointSeries, joint: usize) -> f64 {
     let values = series.q.iter().skip(joint).step_by(series.dof.max(1));
-    let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), q| (lo.min(*q), hi.max(*q)));
-    (hi - lo).max(0.0)
+    let [low, high] = extent(values.copied());
+    (high - low).max(0.0)
 }
 
 fn dead_joints(clip: &Clip) -> [bool; MAX_JOINTS] {

@@ -5,7 +5,7 @@
 
 use super::noise;
 use crate::estimate::plane::{Slope, plane};
-use crate::statistics::median;
+use crate::statistics::{extent, median};
 use shared_mem::recording::JointSeries;
 use shared_mem::time::seconds_between;
 
@@ -88,7 +88,7 @@ impl Motion<'_> {
 /// Whether most joints' velocities come so late that they were filtered; `step`: of the log [s].
 pub fn late(joints: &[Compared], step: f64) -> Option<Late> {
     let delays: Vec<f64> = joints.iter().map(|c| c.delay.value).collect();
-    let interval = delays.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], d| [lo.min(*d), hi.max(*d)]);
+    let interval = extent(delays.iter().copied());
     let delay = median(delays)?;
     let sure = |c: &&Compared| c.delay.value - 2.0 * c.delay.sigma > 0.5 * FILTER_DELAY;
     let most = joints.iter().filter(sure).count() * 3 >= joints.len() * 2;
