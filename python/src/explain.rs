@@ -56,7 +56,7 @@ fn engine(
     let Some(command) = command else { return Ok(None) };
     let arm = ArmModel::from_cell(&session.cell)?;
     let call = Call { command, limit: Duration::try_from_secs_f64(limit)? };
-    Ok(Some(Engine::start(call, (&session.cell, &session.folder, arm.joint_names()), interrupt)?))
+    Ok(Some(Engine::start(call, &session.cell, &session.folder, arm.joint_names(), interrupt)?))
 }
 
 /// What a session says about its cell; the JSON of `calibration diagnose --json`.

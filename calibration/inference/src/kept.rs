@@ -204,7 +204,9 @@ impl Kept {
 /// The results of a command's work: beside its answer `out`, else in the folder of the session. What is found is taken there
 /// when the process has to end before the work does, too.
 pub fn for_work(
-    (out, session, verb): (Option<&Path>, &Path, &str),
+    out: Option<&Path>,
+    session: &Path,
+    verb: &str,
     question: &Fingerprint,
     interrupt: &Interrupt,
 ) -> Arc<Kept> {

@@ -37,7 +37,7 @@ impl EngineArguments {
         }
         let arm = ArmModel::from_cell(cell)?;
         let call = Call { command, limit: Duration::from_secs(self.engine_limit) };
-        Ok(Some(Engine::start(call, (cell, &session.folder, arm.joint_names()), interrupt)?))
+        Ok(Some(Engine::start(call, cell, &session.folder, arm.joint_names(), interrupt)?))
     }
 }
 

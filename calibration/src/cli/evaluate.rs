@@ -142,7 +142,7 @@ pub(super) fn run(arguments: &EvaluateArguments, interrupt: &Interrupt) -> anyho
     let real: Vec<String> = elsewhere.iter().flat_map(of).collect();
     apart("worlds", worlds.iter().map(|world| world.name.as_str()).chain(real.iter().map(String::as_str)))?;
     let question = Fingerprint::of("evaluate");
-    let kept = for_work((Some(arguments.out.as_path()), arguments.out.as_path(), "evaluate"), &question, interrupt);
+    let kept = for_work(Some(&arguments.out), &arguments.out, "evaluate", &question, interrupt);
     let (episodes, seed) = (arguments.episodes, arguments.seed);
     let plan = Plan { policies: arguments.policies.clone(), worlds, episodes, seed, asking };
     let done = study::run(&plan, &kept, interrupt);

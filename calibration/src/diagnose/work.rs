@@ -84,7 +84,7 @@ pub(super) fn kept<R>(
     interrupt: &Interrupt,
     work: impl FnOnce(Work<'_>) -> Result<R, DiagnoseError>,
 ) -> Result<(R, Arc<Kept>), DiagnoseError> {
-    let kept = kept::for_work((options.out.as_deref(), folder, name), question, interrupt);
+    let kept = kept::for_work(options.out.as_deref(), folder, name, question, interrupt);
     let found = work((interrupt, (&kept, "")));
     interrupt.work_is_over();
     // What work says that was cut short is no answer.

@@ -1,5 +1,7 @@
 //! Why an arm or an object cannot be identified.
 
+use inference::admit::LeftOut;
+use inference::admit::remarks::reasons;
 use inference::controller::ControllerError;
 use inference::engine::EngineError;
 use inference::estimate::Impossible;
@@ -7,6 +9,7 @@ use inference::likelihood::setting::BaseError;
 use shared_mem::output::OutputError;
 use shared_mem::recording::ReadError;
 use shared_mem::toml_file::TomlFileError;
+use std::path::Path;
 use twin::arm::ModelError;
 use twin::replay::ReplayError;
 use twin::scene::MeshFileError;
@@ -72,4 +75,15 @@ pub enum IdentifyError {
     /// The answer cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+}
+
+impl IdentifyError {
+    /// Of a session that has clips of a target, `arm` or `object`, and none that can be used.
+    pub(super) fn no_clip(session: &Path, target: &'static str, left_out: &[LeftOut]) -> Self {
+        let why = match reasons(left_out) {
+            none if none.is_empty() => format!("it lists none with an {target}"),
+            why => why,
+        };
+        Self::NoClip { session: session.display().to_string(), target, why }
+    }
 }

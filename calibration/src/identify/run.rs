@@ -2,7 +2,7 @@
 //! ([`Kept`]), and the same command goes on from there to the same answer.
 
 use super::error::IdentifyError;
-use crate::answer::identification::Identification;
+use super::options::Options;
 use inference::estimate::search;
 use inference::estimate::{
     ClipModel, Evolution, Fit, Found, Impossible, Place, Random, Schedule, Search, Swarm, Underway, Unknown, begin,
@@ -11,12 +11,9 @@ use inference::estimate::{
 use inference::interrupt::Interrupt;
 use inference::kept::{Fingerprint, Kept};
 use shared_mem::progress::Progress;
-use shared_mem::theta::Theta;
 use shared_mem::typed;
-use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 /// Ways of searching.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -50,12 +47,8 @@ const USUAL_LINEARISATIONS: usize = 4;
 pub(super) struct Run<'a> {
     pub(super) unknowns: &'a [Unknown],
     pub(super) random: &'a [Random],
-    pub(super) optimizer: Optimizer,
-    pub(super) seed: u64,
-    /// Points whose cost a search without slopes may ask for.
-    pub(super) budget: usize,
-    pub(super) kept: &'a Kept,
-    pub(super) interrupt: &'a Interrupt,
+    pub(super) options: &'a Options,
+    pub(super) work: Work<'a>,
 }
 
 /// The end of a search.
@@ -75,24 +68,19 @@ fn step(name: &str) -> Fingerprint {
 impl Run<'_> {
     /// Searches; `model` has the clips to be fitted, `first` those of them that a rough fit may begin with.
     pub(super) fn search<M: ClipModel>(&self, model: &M, first: &impl ClipModel) -> Result<Outcome, IdentifyError> {
-        let per_point = model.clips();
-        let expected = match self.optimizer {
-            Optimizer::LeastSquares => USUAL_LINEARISATIONS * (1 + self.unknowns.len()) * per_point,
-            _ => self.budget * per_point,
+        let Options { optimizer, budget, seed, .. } = *self.options;
+        let points = match optimizer {
+            Optimizer::LeastSquares => USUAL_LINEARISATIONS * (1 + self.unknowns.len()),
+            _ => budget,
         };
-        let watch = Watch::new(expected, self.interrupt);
-        let outcome = match self.optimizer {
+        let watch = Watch::new(points * model.clips(), self.work.interrupt);
+        let start = search::start(self.unknowns);
+        let outcome = match optimizer {
             Optimizer::LeastSquares => self.least_squares(&watch, model, first),
-            Optimizer::Swarm => {
-                let swarm = Swarm::new(&search::start(self.unknowns), self.seed);
-                self.without_slopes(&watch, model, swarm)
-            }
-            Optimizer::Evolution => {
-                let evolution = Evolution::new(&search::start(self.unknowns), self.seed);
-                self.without_slopes(&watch, model, evolution)
-            }
+            Optimizer::Swarm => self.without_slopes(&watch, model, Swarm::new(&start, seed)),
+            Optimizer::Evolution => self.without_slopes(&watch, model, Evolution::new(&start, seed)),
         };
-        stopped(Work { kept: self.kept, interrupt: self.interrupt })?;
+        stopped(self.work)?;
         outcome
     }
 
@@ -102,34 +90,33 @@ impl Run<'_> {
         model: &M,
         first: &impl ClipModel,
     ) -> Result<Outcome, IdentifyError> {
-        let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
-        let at_rest = |shared, clips| Place::at_rest(shared, self.random, clips);
+        let Self { unknowns, random, work: Work { kept, interrupt }, .. } = *self;
         let all = Watched { model, watch };
         type Way = (Underway, Vec<[f64; 2]>);
-        let (now, way): Way = match self.kept.known(&step("way")) {
+        let (now, way): Way = match kept.known(&step("way")) {
             Some(known) => known,
             None => {
-                let start = if first.clips() < model.clips() {
+                let mut start: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
+                if first.clips() < model.clips() {
                     let few = Watched { model: first, watch };
-                    let (from, schedule) = (at_rest(start, first.clips()), Schedule::of(STEPS_OF_THE_ROUGH_FIT));
-                    fit_from(&few, self.unknowns, self.random, from, &schedule, |_, _| !self.interrupt.asked())?.shared
-                } else {
-                    start
-                };
-                let start = at_rest(start, model.clips());
-                (begin(&all, (self.unknowns, self.random), &start, &Schedule::default())?, Vec::new())
+                    let (from, schedule) =
+                        (Place::at_rest(start, random, first.clips()), Schedule::of(STEPS_OF_THE_ROUGH_FIT));
+                    start = fit_from(&few, unknowns, random, from, &schedule, |_, _| !interrupt.asked())?.shared;
+                }
+                let start = Place::at_rest(start, random, model.clips());
+                (begin(&all, (unknowns, random), &start, &Schedule::default())?, Vec::new())
             }
         };
         watch.already(way.last().map_or(0, |[simulated, _]| *simulated as usize));
         let way = Mutex::new(way);
-        let fit = go_on(&all, (self.unknowns, self.random), now, &Schedule::default(), |now| {
+        let fit = go_on(&all, (unknowns, random), now, &Schedule::default(), |now| {
             let mut way = way.lock().expect("no holder panics");
             // Once: what is gone on from stands there already.
             if way.len() < now.fit.history.len() {
                 way.push([watch.simulated() as f64, now.fit.deviance()]);
             }
-            self.kept.keep(&step("way"), &(now, &*way));
-            !self.interrupt.asked()
+            kept.keep(&step("way"), &(now, &*way));
+            !interrupt.asked()
         })?;
         let rows = fit.clips.iter().map(|clip| clip.rows).sum::<usize>().max(1) as f64;
         let mut convergence = way.into_inner().expect("no holder panics");
@@ -145,21 +132,22 @@ impl Run<'_> {
         mut search: impl Search,
     ) -> Result<Outcome, IdentifyError> {
         let all = Watched { model, watch };
-        let answers: Vec<Vec<f64>> = self.kept.known(&step("answers")).unwrap_or_default();
+        let Work { kept, interrupt } = self.work;
+        let answers: Vec<Vec<f64>> = kept.known(&step("answers")).unwrap_or_default();
         watch.already(answers.iter().map(Vec::len).sum::<usize>() * model.clips());
         let mut so_far = answers.clone();
         let found: Found = minimise(
             &mut search,
             self.unknowns,
-            self.budget,
+            self.options.budget,
             &answers,
             |x| self.cost(&all, x),
             |costs, _| {
-                if self.interrupt.asked() {
+                if interrupt.asked() {
                     return false;
                 }
                 so_far.push(costs.to_vec());
-                self.kept.keep(&step("answers"), &so_far);
+                kept.keep(&step("answers"), &so_far);
                 true
             },
         );
@@ -206,27 +194,6 @@ impl<'a> Work<'a> {
 /// Whether the user asked for the end: then what was found so far is taken to its file.
 pub(super) fn stopped(Work { kept, interrupt }: Work<'_>) -> Result<(), IdentifyError> {
     if interrupt.asked() { Err(IdentifyError::Interrupted(kept.farewell(&typed::command()))) } else { Ok(()) }
-}
-
-/// The answer of work whose steps were kept, once its parameters are in their file; then nothing needs to be kept any more.
-pub(super) fn concluded(
-    found: Result<(Identification, Theta), IdentifyError>,
-    out: Option<&Path>,
-    began: Instant,
-    work: Work<'_>,
-) -> Result<Identification, IdentifyError> {
-    let Work { kept, interrupt } = work;
-    interrupt.work_is_over();
-    // What work says that was cut short is no answer.
-    stopped(work)?;
-    let (mut answer, theta) = found?;
-    if let Some(out) = out {
-        theta.write(out)?;
-        answer.theta_file = Some(out.to_owned());
-    }
-    kept.done();
-    answer.seconds = began.elapsed().as_secs_f64();
-    Ok(answer)
 }
 
 /// The bar and the interruption of a search.

@@ -15,9 +15,10 @@ pub(super) struct Used {
 
 impl Used {
     /// A quarter of the commands of `all`, each with its file, is held out; `seed` draws which.
-    pub(super) fn of(all: &[(&str, &Clip)], left_out: Vec<LeftOut>, seed: u64) -> Self {
-        let split = Split::held_out(&by_command(all.iter().map(|(_, clip)| *clip)), seed);
-        let files = |clips: &[usize]| clips.iter().map(|clip| all[*clip].0.to_owned()).collect();
+    pub(super) fn of<'a>(all: impl IntoIterator<Item = (String, &'a Clip)>, left_out: Vec<LeftOut>, seed: u64) -> Self {
+        let (names, clips): (Vec<String>, Vec<&Clip>) = all.into_iter().unzip();
+        let split = Split::held_out(&by_command(clips), seed);
+        let files = |clips: &[usize]| clips.iter().map(|clip| names[*clip].clone()).collect();
         let clips = Clips { train: files(&split.train), holdout: files(&split.confirm), left_out };
         Self { split, clips }
     }
@@ -72,15 +73,16 @@ mod tests {
     fn repeats_stay_on_one_side_and_a_single_motion_leaves_nothing_to_hold_out() {
         let clips = [1, 2, 1, 3, 4].map(clip);
         let files = ["a", "b", "c", "d", "e"];
-        let all: Vec<(&str, &Clip)> = files.into_iter().zip(&clips).collect();
+        let all: Vec<(String, &Clip)> = files.into_iter().map(str::to_owned).zip(&clips).collect();
         for seed in 0..8 {
-            let used = Used::of(&all, Vec::new(), seed);
+            let used = Used::of(all.clone(), Vec::new(), seed);
             let Clips { train, holdout, .. } = &used.clips;
             assert_eq!(train.len() + holdout.len(), 5);
             assert_eq!(train.contains(&"a".to_owned()), train.contains(&"c".to_owned()), "seed {seed}");
             assert!((1..=2).contains(&holdout.len()) && used.warnings("another").is_empty(), "{holdout:?}");
         }
-        let alone = Used::of(&[all[0], all[2]], vec![LeftOut { file: "f".into(), why: "not hit".into() }], 0);
+        let alone =
+            Used::of([all[0].clone(), all[2].clone()], vec![LeftOut { file: "f".into(), why: "not hit".into() }], 0);
         assert!(alone.clips.holdout.is_empty() && alone.split.train == [0, 1]);
         let said = alone.warnings("another motion");
         assert!(said[0].contains("a single motion") && said[0].ends_with("record another motion"), "{said:?}");

@@ -63,7 +63,7 @@ fn left_under(
     interrupt: &Interrupt,
 ) -> Result<Option<f64>, ControllerError> {
     let base = begun(cell, &clips.iter().collect::<Vec<_>>(), &complete(cell, given)?, interrupt)?;
-    match fitted((cell, None), &base, clips.to_vec(), interrupt) {
+    match fitted(cell, None, &base, clips.to_vec(), interrupt) {
         Ok((_, fit)) if !fit.clips.is_empty() => Ok(Some(fit.misfit().sqrt())),
         Ok(_) | Err(ControllerError::Impossible(_)) => Ok(None),
         Err(error) => Err(error),

@@ -82,7 +82,8 @@ pub fn begun(cell: &Cell, clips: &[&Clip], base: &Theta, interrupt: &Interrupt) 
 /// # Errors
 /// [`ControllerError`] when the arm cannot be simulated where the fit begins.
 pub fn fitted(
-    (cell, engine): (&Cell, Option<Arc<Engine>>),
+    cell: &Cell,
+    engine: Option<Arc<Engine>>,
     base: &Theta,
     clips: Vec<Clip>,
     interrupt: &Interrupt,

@@ -126,7 +126,9 @@ impl Engine {
     /// [`EngineError`] when it does not start, or does not speak the protocol.
     pub fn start(
         call: Call,
-        (cell, folder, joints): (&Cell, &Path, &[String]),
+        cell: &Cell,
+        folder: &Path,
+        joints: &[String],
         interrupt: &Interrupt,
     ) -> Result<Arc<Self>, EngineError> {
         let wrong = |what: String| EngineError::Wrong { command: call.command.clone(), what };

@@ -11,7 +11,7 @@ fn cell() -> Cell {
 fn started(command: &str, limit: Duration) -> Result<(Arc<Engine>, Interrupt), EngineError> {
     let interrupt = Interrupt::default();
     let call = Call { command: command.into(), limit };
-    let engine = Engine::start(call, (&cell(), Path::new("."), &["joint".into()]), &interrupt)?;
+    let engine = Engine::start(call, &cell(), Path::new("."), &["joint".into()], &interrupt)?;
     Ok((engine, interrupt))
 }
 

@@ -73,13 +73,11 @@ pub fn fit_object(
             break;
         }
         clips.set_model_error(model_error(clips, &at)?);
-        let (shared, own) = (at.shared.clone(), at.own());
-        at = search.steps(&Question { clips, unknowns, random: &random }, (&shared, &own), 2)?;
+        at = search.steps(&Question { clips, unknowns, random: &random }, &at.shared, &at.own(), 2)?;
     }
     let Search { evaluations, convergence, stopped, .. } = search;
     let looked = Fingerprint::of(trail.1).with(&"widths");
-    let half = at.estimate(unknowns).2.half_width;
-    let look = || Question { clips, unknowns, random: &random }.widths(&at, &half);
+    let look = || Question { clips, unknowns, random: &random }.widths(&at);
     let (widths, looks): (Vec<f64>, usize) = trail.0.once_if_ok(&looked, look)?;
     let evaluations = evaluations + looks;
     Ok(ObjectFit { converged: at.small && !stopped, at, widths, evaluations, convergence })
@@ -120,8 +118,7 @@ pub fn linearise_object(clips: &mut ObjectClips, unknowns: &[Unknown], at: &[f64
 /// # Errors
 /// As [`linearise_object`].
 pub fn widths(clips: &ObjectClips, unknowns: &[Unknown], at: &Linearised) -> Result<Vec<f64>, Impossible> {
-    let half = at.estimate(unknowns).2.half_width;
-    Ok(Question { clips, unknowns, random: &clips.random().random }.widths(at, &half)?.0)
+    Ok(Question { clips, unknowns, random: &clips.random().random }.widths(at)?.0)
 }
 
 struct Search<'a, W> {
@@ -138,11 +135,7 @@ impl<'a, W: Fn(&[f64], usize) -> bool> Search<'a, W> {
     }
 
     /// A step from there, worked out unless it is known.
-    fn improved(
-        &self,
-        question: &Question<'_>,
-        (shared, own): (&[f64], &[Vec<f64>]),
-    ) -> Result<Linearised, Impossible> {
+    fn improved(&self, question: &Question<'_>, shared: &[f64], own: &[Vec<f64>]) -> Result<Linearised, Impossible> {
         let (kept, name) = self.trail;
         let step = Fingerprint::of(name).with(&("step", self.convergence.len()));
         kept.once_if_ok(&step, || question.improved(shared, own))
@@ -159,16 +152,17 @@ impl<'a, W: Fn(&[f64], usize) -> bool> Search<'a, W> {
         clips.set_model_error(INITIAL_MODEL_ERROR);
         let random = held(clips);
         let own = vec![vec![0.0; random.len()]; clips.clips()];
-        self.steps(&Question { clips, unknowns, random: &random }, (start, &own), most)
+        self.steps(&Question { clips, unknowns, random: &random }, start, &own, most)
     }
 
     fn steps(
         &mut self,
         question: &Question<'_>,
-        (shared, own): (&[f64], &[Vec<f64>]),
+        shared: &[f64],
+        own: &[Vec<f64>],
         most: usize,
     ) -> Result<Linearised, Impossible> {
-        let mut at = self.improved(question, (shared, own))?;
+        let mut at = self.improved(question, shared, own)?;
         for step in 1.. {
             self.evaluations += at.evaluations;
             let rows: usize = at.clips.iter().map(|clip| clip.rows).sum();
@@ -177,7 +171,7 @@ impl<'a, W: Fn(&[f64], usize) -> bool> Search<'a, W> {
             if at.small || self.stopped || step >= most {
                 break;
             }
-            at = self.improved(question, (&at.shared, &at.own()))?;
+            at = self.improved(question, &at.shared, &at.own())?;
         }
         Ok(at)
     }

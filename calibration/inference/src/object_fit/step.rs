@@ -117,13 +117,13 @@ impl Question<'_> {
     }
 
     /// By how much wider than slopes say the clips leave each number, 1 to [`MAX_WIDENING`]: the deviance is looked at where the
-    /// interval of half width `half` ends, to both sides, the other numbers following. A hit's roughness makes slopes, and
+    /// 95 % interval ends, to both sides, the other numbers following. A hit's roughness makes slopes, and
     /// so information, larger than what the clips can really tell, and nearer by nothing but the roughness would be seen.
     ///
     /// # Errors
     /// As [`Self::improved`].
-    pub fn widths(&self, at: &Linearised, half: &[f64]) -> Result<(Vec<f64>, usize), Impossible> {
-        let n = at.shared.len();
+    pub fn widths(&self, at: &Linearised) -> Result<(Vec<f64>, usize), Impossible> {
+        let (n, half) = (at.shared.len(), at.estimate(self.unknowns).2.half_width);
         let (own, mut strokes) = (at.own(), Strokes { question: *self, evaluations: 0 });
         let information = at.information();
         let Some(covariance) = information.clone().try_inverse() else { return Ok((vec![1.0; n], 0)) };

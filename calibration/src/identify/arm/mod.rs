@@ -19,25 +19,21 @@ mod verdict;
 use super::error::IdentifyError;
 use super::finding::Finding;
 pub use super::options::Options;
-use super::run::{Outcome, Run, Work, concluded};
+use super::run::{Outcome, Run, Work};
 use super::used::Used;
 use crate::answer::identification::Identification;
 use inference::controller::{controlled, start};
-use inference::engine;
 use inference::estimate::interval::LEVEL;
-use inference::estimate::{Intervals, Random, Subset, Unknown, at_bounds};
-
+use inference::estimate::{Intervals, Subset, Unknown, at_bounds};
 use inference::interrupt::Interrupt;
-use inference::kept;
 use inference::kept::Fingerprint;
 use inference::likelihood::arm::ArmClips;
 use inference::likelihood::setting::{arm_numbers, complete, effect_settings};
 use inference::likelihood::{Setting, Settings};
 use session::Material;
 use shared_mem::cell::Cell;
-use shared_mem::recording::{Clip, SessionFiles};
+use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
-use std::time::Instant;
 use twin::arm::ArmModel;
 use twin::effects::{EffectInfo, Robot, Stage, find, registry};
 
@@ -76,82 +72,41 @@ fn identify_material(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Identification, IdentifyError> {
-    let began = Instant::now();
     if material.cell.robot.is_none() || material.cell.controller.is_none() {
         return Err(IdentifyError::NoArm(if material.cell.robot.is_none() { "[robot]" } else { "[controller]" }));
     }
-    let given = options.parameters.as_deref().map(Theta::read).transpose()?;
-    let question = Fingerprint::of("identify arm")
-        .with(&(options.optimizer.name(), options.budget, options.seed, &options.also))
-        .with(&given.as_ref().map(Theta::to_toml))
-        .with_cell(&material.cell)
-        .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
-        .with_clips(&material.clips);
-    let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_arm"), &question, interrupt);
-    let work = Work { kept: &kept, interrupt };
-    let found = identify_kept(material, given.as_ref(), options, work);
-    concluded(found, options.out.as_deref(), began, work)
+    let given = options.given()?;
+    let question = options.question("arm", given.as_ref(), &material.cell, &material.clips);
+    options.answered("arm", &question, interrupt, |work| identify_kept(material, given, options, work))
 }
 
 /// The answer, and the parameters that are written.
 fn identify_kept(
     Material { cell, clips, left_out }: Material,
-    given: Option<&Theta>,
+    given: Option<Theta>,
     options: &Options,
     work: Work<'_>,
 ) -> Result<(Identification, Theta), IdentifyError> {
-    let Work { kept, interrupt } = work;
     let mut remarks = Vec::new();
-    let cell = controlled(cell, &clips, given, &mut remarks, interrupt)?;
-    let base = complete(&cell, given)?;
+    let cell = controlled(cell, &clips, given.as_ref(), &mut remarks, work.interrupt)?;
+    let base = complete(&cell, given.as_ref())?;
     let (settings, mut unknowns): (Vec<_>, Vec<_>) = searched(&cell, &base, &options.also)?.into_iter().unzip();
     let settings = Settings::new(base, settings);
     let numbers: Numbers<'_> = Box::new(|shared| settings.theta(shared));
     let (model, unusable) = ArmClips::means(&cell, clips, numbers)?;
     let mut model = model.moved_by(options.engine.clone(), &complete(&cell, None)?);
     let clips = session::used(&options.session, &model, left_out, unusable, options.seed)?;
-    let free = unknowns.clone();
-    session::hold_dead(&model, &clips.split.train, settings.settings(), &mut unknowns);
     let before: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
-    let starts: Vec<f64> = kept.once(&Fingerprint::of("starts"), || {
-        let mut unknowns = unknowns.clone();
-        start::improve(&cell, &model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
-        saturation::improve(&model, &clips.split.train, settings.settings(), &mut unknowns, interrupt);
-        unknowns.into_iter().map(|unknown| unknown.start).collect()
-    });
-    unknowns.iter_mut().zip(starts).for_each(|(unknown, start)| unknown.start = start);
-    model.settle_dead_joints(&unknowns.iter().map(|unknown| unknown.start).collect::<Vec<_>>());
-    // What moves unseen shows in its neighbours.
-    for (unknown, free) in unknowns.iter_mut().zip(&free) {
-        (unknown.lower, unknown.upper) = (free.lower, free.upper);
-    }
-    session::hold_dead(&model, &clips.split.train, settings.settings(), &mut unknowns);
+    let train = &clips.split.train;
+    begin(&cell, (&mut model, train), settings.settings(), &mut unknowns, work);
     let random = model.random();
-    let mut outcome = search(options, &model, &clips, (&unknowns, &random), work)?;
-    let error = kept.once_if_ok(&Fingerprint::of("time step"), || {
-        time_step::error(&model, &clips.split.train, (&unknowns, &random), &outcome.fit)
-    });
-    let open = time_step::taken_out(&mut outcome.fit, &unknowns, &error?);
-    saturation::forget_unreached(&model, settings.settings(), &mut outcome.fit);
-    let held = at_bounds(&unknowns, &outcome.fit.shared);
-    let mut intervals = Intervals::new(&outcome.fit, &held, LEVEL);
-    intervals.half_width.iter_mut().zip(&open).for_each(|(half, open)| *half = half.hypot(*open));
-    let Outcome { fit, simulated, convergence, arrived } = outcome;
-    let finding = Finding {
-        settings: settings.settings(),
-        unknowns: &unknowns,
-        fit,
-        held,
-        intervals,
-        simulated,
-        convergence,
-        arrived,
-    };
+    let run = Run { unknowns: &unknowns, random: &random, options, work };
+    // A rough fit to a third of the clips brings the rest near for a third of the price.
+    let first = Subset { model: &model, clips: &train[..train.len().div_ceil(3)] };
+    let outcome = run.search(&Subset { model: &model, clips: train }, &first)?;
+    let finding = finding(&model, train, settings.settings(), &run, outcome)?;
     let mut answer = finding.answer("arm", &before);
-    answer.warnings.extend((!arrived).then(|| UNFINISHED.to_owned()));
-    answer.session = options.session.display().to_string();
-    answer.files = SessionFiles { session: options.session.clone(), cell: options.cell.clone() };
-    answer.optimizer = options.optimizer.name().into();
+    answer.warnings.extend((!finding.arrived).then(|| UNFINISHED.to_owned()));
     figures::fill(&mut answer, &model, &clips, &random, [&before, &finding.fit.shared])?;
     answer.not_identifiable = verdict::not_identifiable(&finding, &model, &clips, options.optimizer);
     answer.warnings.extend(doubt::doubts(&answer, &finding, &model, &clips, &before));
@@ -160,12 +115,53 @@ fn identify_kept(
     answer.warnings.extend(clips.warnings("another motion"));
     Used::add_remarks(&mut answer);
     answer.clips = clips.clips;
-    answer.engine = options.engine.as_ref().map(|engine| engine.used());
-    answer.warnings.extend(answer.engine.iter().flat_map(engine::Used::sentences));
     // Of an object nothing was found.
-    let given = given.cloned().unwrap_or_default();
+    let given = given.unwrap_or_default();
     let theta = Theta { object: given.object, others: given.others, ..settings.theta(&finding.fit.shared) };
     Ok((answer, theta))
+}
+
+/// Moves the starts to where a coarse look leads, and holds gains of joints that stand still. A joint that the others feel move only
+/// reads as if it stood still: it follows its command unseen from then on, and its gains are free again.
+fn begin(
+    cell: &Cell,
+    (model, train): (&mut Model<'_>, &[usize]),
+    settings: &[Setting],
+    unknowns: &mut [Unknown],
+    Work { kept, interrupt }: Work<'_>,
+) {
+    let free = unknowns.to_vec();
+    session::hold_dead(model, train, settings, unknowns);
+    let starts: Vec<f64> = kept.once(&Fingerprint::of("starts"), || {
+        let mut unknowns = unknowns.to_vec();
+        start::improve(cell, model, train, settings, &mut unknowns, interrupt);
+        saturation::improve(model, train, settings, &mut unknowns, interrupt);
+        unknowns.into_iter().map(|unknown| unknown.start).collect()
+    });
+    model.settle_dead_joints(&starts);
+    for ((unknown, free), start) in unknowns.iter_mut().zip(free).zip(starts) {
+        *unknown = Unknown { start, ..free };
+    }
+    session::hold_dead(model, train, settings, unknowns);
+}
+
+/// What a search found, the error of the twin's time step taken out and what stays open of it in the intervals.
+fn finding<'a>(
+    model: &Model<'_>,
+    train: &[usize],
+    settings: &'a [Setting],
+    &Run { unknowns, random, work, .. }: &Run<'a>,
+    Outcome { mut fit, simulated, convergence, arrived }: Outcome,
+) -> Result<Finding<'a>, IdentifyError> {
+    let error = work
+        .kept
+        .once_if_ok(&Fingerprint::of("time step"), || time_step::error(model, train, unknowns, random, &fit))?;
+    let open = time_step::taken_out(&mut fit, unknowns, &error);
+    saturation::forget_unreached(model, settings, &mut fit);
+    let held = at_bounds(unknowns, &fit.shared);
+    let mut intervals = Intervals::new(&fit, &held, LEVEL);
+    intervals.half_width.iter_mut().zip(&open).for_each(|(half, open)| *half = half.hypot(*open));
+    Ok(Finding { settings, unknowns, fit, held, intervals, simulated, convergence, arrived })
 }
 
 /// Gains, and the parameters of the effects that were asked for.
@@ -184,28 +180,4 @@ fn searched(cell: &Cell, base: &Theta, also: &[String]) -> Result<Vec<(Setting, 
         all.extend(new);
     }
     Ok(all)
-}
-
-fn search(
-    options: &Options,
-    model: &Model<'_>,
-    clips: &Used,
-    (unknowns, random): (&[Unknown], &[Random]),
-    work: Work<'_>,
-) -> Result<Outcome, IdentifyError> {
-    let Work { kept, interrupt } = work;
-    let run = Run {
-        unknowns,
-        random,
-        optimizer: options.optimizer,
-        seed: options.seed,
-        budget: options.budget,
-        kept,
-        interrupt,
-    };
-    let train = &clips.split.train;
-    let all = Subset { model, clips: train };
-    // A rough fit to a third of the clips brings the rest near for a third of the price.
-    let first = Subset { model, clips: &train[..train.len().div_ceil(3)] };
-    run.search(&all, &first)
 }

@@ -3,7 +3,6 @@
 use super::Model;
 use crate::identify::error::IdentifyError;
 use crate::identify::used::Used;
-use inference::admit::remarks::reasons;
 use inference::admit::{self, Looked};
 use inference::estimate::{ClipModel as _, Unknown};
 use inference::likelihood::Setting;
@@ -37,14 +36,10 @@ pub(super) fn used(
 ) -> Result<Used, IdentifyError> {
     left_out.extend(unusable.into_iter().map(|clip| admit::LeftOut { file: clip.file, why: clip.why.to_string() }));
     if model.clips() == 0 {
-        let reasons = reasons(&left_out);
-        let why = if reasons.is_empty() { "it lists none with an arm".into() } else { reasons };
-        return Err(IdentifyError::NoClip { session: path.display().to_string(), target: "arm", why });
+        return Err(IdentifyError::no_clip(path, "arm", &left_out));
     }
-    let all: Vec<_> = (0..model.clips()).map(|clip| model.clip(clip)).collect();
-    let all: Vec<(String, &Clip)> = all.into_iter().map(|clip| (clip.name(), &clip.recorded)).collect();
-    let all: Vec<(&str, &Clip)> = all.iter().map(|(name, clip)| (name.as_str(), *clip)).collect();
-    Ok(Used::of(&all, left_out, seed))
+    let all = (0..model.clips()).map(|clip| (model.clip(clip).name(), &model.clip(clip).recorded));
+    Ok(Used::of(all, left_out, seed))
 }
 
 /// Gains of joints that stand still in every clip to be fitted stay where they are.

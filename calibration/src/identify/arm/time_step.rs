@@ -21,24 +21,26 @@ const SHARE_LEFT_OPEN: f64 = 0.25;
 pub(super) fn error(
     model: &Model<'_>,
     train: &[usize],
-    (unknowns, random): (&[Unknown], &[Random]),
+    unknowns: &[Unknown],
+    random: &[Random],
     fit: &Fit,
 ) -> Result<Vec<f64>, Impossible> {
-    let jobs: Vec<(&usize, &ClipFit)> = train.iter().zip(&fit.clips).collect();
-    let off = |(clip, linear): &(&usize, &ClipFit)| {
-        let in_parts = |parts| model.residuals_in(parts, (**clip, &fit.shared, &linear.own));
+    let off = |place: usize| {
+        let in_parts = |parts| model.residuals_in(parts, (train[place], &fit.shared, &fit.clips[place].own));
         let (whole, mut halves) = (in_parts(1)?, in_parts(2)?);
         halves.iter_mut().zip(&whole).for_each(|(half, whole)| *half = RICHARDSON * (*half - whole));
         Ok(halves)
     };
-    let by = jobs.par_iter().map(off).collect::<Result<Vec<_>, _>>()?;
+    let by = (0..train.len()).into_par_iter().map(off).collect::<Result<Vec<_>, Impossible>>()?;
     let clips = Subset { model, clips: train };
     let shifted = Shifted { model: &clips, by: &by };
-    let slope = |(number, linear): (usize, &ClipFit)| {
-        let there = ClipFit::at(&shifted, number, (unknowns, &fit.shared), (random, &linear.own))?;
+    // Slopes at the shifted residuals less those of the fit: what the error of the step adds to the gradient.
+    let slope = |place: usize| {
+        let linear = &fit.clips[place];
+        let there = ClipFit::at(&shifted, place, (unknowns, &fit.shared), (random, &linear.own))?;
         Ok(there.gradient - &linear.gradient)
     };
-    let slopes = fit.clips.par_iter().enumerate().map(slope).collect::<Result<Vec<_>, Impossible>>()?;
+    let slopes = (0..train.len()).into_par_iter().map(slope).collect::<Result<Vec<_>, Impossible>>()?;
     let slope = slopes.iter().fold(DVector::zeros(unknowns.len()), |sum, slope| sum + slope);
     Ok(moved_by(fit, &at_bounds(unknowns, &fit.shared), &slope).iter().copied().collect())
 }
@@ -96,7 +98,7 @@ mod tests {
             (off / truth.len() as f64).sqrt()
         };
         let before = off(&found.shared);
-        let error = error(&model, &[0], (&unknowns, &random), &found).expect("an answer");
+        let error = error(&model, &[0], &unknowns, &random, &found).expect("an answer");
         let open = taken_out(&mut found, &unknowns, &error);
         let after = off(&found.shared);
         assert!(before > 1e-5 && after < 0.2 * before, "off by {before:e}, and then by {after:e}");

@@ -10,12 +10,12 @@ use super::polish::{fit_polished, fit_poses_alone, usual_evaluations};
 use super::{Options, Problem};
 use crate::answer::identification::Figures;
 use crate::identify::error::IdentifyError;
-use crate::identify::run::{Optimizer, Run, Work, stopped};
-use inference::estimate::{ClipModel as _, Unknown};
+use crate::identify::run::{Optimizer, Outcome, Run, Work, stopped};
 use inference::interrupt::Interrupt;
 use inference::kept::Kept;
 use inference::likelihood::object::ObjectClips;
 use inference::likelihood::{Setting, Settings};
+use inference::object_fit::ObjectFit;
 use inference::object_fit::fit_object;
 use serde::Serialize;
 use shared_mem::progress::Progress;
@@ -69,15 +69,15 @@ pub struct Method {
 pub fn compare(options: &Options, interrupt: &Interrupt) -> Result<Comparison, IdentifyError> {
     let material = Material::open(options)?;
     let problem = Problem::new(&material, options, Work::passing(interrupt))?;
-    let without: Vec<usize> = (0..problem.unknowns.len())
-        .filter(|k| !matches!(problem.settings.settings()[*k], Setting::CentreOfMass(_)))
-        .collect();
-    let pin = problem.of(&without);
-    let usual = sloped("least squares", &problem, &material, Searcher::Usual(options.seed), interrupt)?;
-    let alone = sloped("poses alone", &problem, &material, Searcher::PosesAlone(options.seed), interrupt)?;
-    let swarm = slopeless("particle swarm", Optimizer::Swarm, &problem, &material, options, interrupt)?;
-    let evolution = slopeless("CMA-ES", Optimizer::Evolution, &problem, &material, options, interrupt)?;
-    let slopes = sloped("gradient without centre of mass", &pin, &material, Searcher::Slopes, interrupt)?;
+    let is_centre = |k: &usize| matches!(problem.settings.settings()[*k], Setting::CentreOfMass(_));
+    let without: Vec<usize> = (0..problem.unknowns.len()).filter(|k| !is_centre(k)).collect();
+    let whole = Contest { problem: &problem, material: &material, options, interrupt };
+    let pin = Contest { problem: &problem.of(&without), ..whole };
+    let usual = whole.sloped("least squares", Searcher::Usual)?;
+    let alone = whole.sloped("poses alone", Searcher::PosesAlone)?;
+    let swarm = whole.slopeless("particle swarm", Optimizer::Swarm)?;
+    let evolution = whole.slopeless("CMA-ES", Optimizer::Evolution)?;
+    let slopes = pin.sloped("gradient without centre of mass", Searcher::Slopes)?;
     stopped(Work::passing(interrupt))?;
     let target = swarm.loss_m;
     let clips = |method: &Method| method.to(target).map(|(clips, _)| clips as f64);
@@ -109,122 +109,97 @@ impl Problem {
     }
 }
 
-/// How far slopes are followed, and with which seed what is scattered.
+/// How far slopes are followed.
 #[derive(Clone, Copy)]
 enum Searcher {
     /// As `identify object` goes.
-    Usual(u64),
+    Usual,
     /// By the loss of poses alone.
-    PosesAlone(u64),
+    PosesAlone,
     /// Nothing but slopes.
     Slopes,
 }
 
-fn sloped(
-    name: &str,
-    problem: &Problem,
-    material: &Material,
-    searcher: Searcher,
-    interrupt: &Interrupt,
-) -> Result<Method, IdentifyError> {
-    let mut clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
-    let start: Vec<f64> = problem.unknowns.iter().map(|unknown| unknown.start).collect();
-    let (began, steps) = (Instant::now(), Mutex::new(Vec::new()));
-    let shape = problem.shape(&clips)?;
-    let bar = Progress::new(name, usual_evaluations(&clips, &problem.unknowns) as u64);
-    let watch = |numbers: &[f64], evaluations: usize| {
-        bar.show(evaluations as u64, &format!("{evaluations} clips simulated"));
-        steps.lock().expect("no holder panics").push((numbers.to_vec(), evaluations, began.elapsed().as_secs_f64()));
-        !interrupt.asked()
-    };
-    let trail = (Kept::nothing(), "");
-    let (numbers, evaluations) = match searcher {
-        Searcher::Usual(seed) => {
-            let found = fit_polished(&mut clips, problem.searched(&shape, seed), &start, trail, watch)?;
-            (found.at.shared, found.evaluations)
-        }
-        Searcher::PosesAlone(seed) => fit_poses_alone(&mut clips, problem.searched(&shape, seed), &start, watch)?,
-        Searcher::Slopes => {
-            let found = fit_object(&mut clips, &problem.unknowns, &start, trail, watch)?;
-            (found.at.shared, found.evaluations)
-        }
-    };
-    let seconds = began.elapsed().as_secs_f64();
-    let loss = SurfaceLoss::new(&clips, &shape);
-    let equal = vec![1.0; loss.clips()];
-    let way = steps.into_inner().expect("no holder panics");
-    let way = way.into_iter().map(|(numbers, n, at)| Ok((n, at, loss.mean(&numbers, &equal)?)));
-    let way = way.collect::<Result<Vec<_>, IdentifyError>>()?;
-    let last = loss.mean(&numbers, &equal)?;
-    finished(name, problem, material, &numbers, (evaluations, seconds, last, way))
+/// What every way of searching is given.
+#[derive(Clone, Copy)]
+struct Contest<'a> {
+    problem: &'a Problem,
+    material: &'a Material,
+    options: &'a Options,
+    interrupt: &'a Interrupt,
 }
 
-fn slopeless(
-    name: &str,
-    optimizer: Optimizer,
-    problem: &Problem,
-    material: &Material,
-    options: &Options,
-    interrupt: &Interrupt,
-) -> Result<Method, IdentifyError> {
-    let clips = ObjectClips::new(&material.cell, material.train(), problem.settings.clone())?;
-    let shape = problem.shape(&clips)?;
-    let loss = SurfaceLoss::new(&clips, &shape);
-    let run = Run {
-        unknowns: &problem.unknowns,
-        random: &[],
-        optimizer,
-        seed: options.seed,
-        budget: options.budget,
-        kept: Kept::nothing(),
-        interrupt,
-    };
-    let began = Instant::now();
-    let outcome = run.search(&loss, &loss)?;
-    let seconds = began.elapsed().as_secs_f64();
-    let all = outcome.simulated.max(1) as f64;
-    let way = outcome.convergence.iter().map(|[n, loss]| (*n as usize, seconds * n / all, *loss)).collect();
-    let numbers = &outcome.fit.shared;
-    finished(
-        name,
-        problem,
-        material,
-        numbers,
-        (outcome.simulated, seconds, loss.mean(numbers, &vec![1.0; loss.clips()])?, way),
-    )
-}
+impl Contest<'_> {
+    fn clips(&self) -> Result<ObjectClips, IdentifyError> {
+        Ok(ObjectClips::new(&self.material.cell, self.material.train(), self.problem.settings.clone())?)
+    }
 
-/// Clips simulated, wall time, last loss, and the way there.
-type Course = (usize, f64, f64, Vec<(usize, f64, f64)>);
+    fn sloped(&self, name: &str, searcher: Searcher) -> Result<Method, IdentifyError> {
+        let (mut clips, start) = (self.clips()?, self.problem.start());
+        let (began, steps) = (Instant::now(), Mutex::new(Vec::new()));
+        let shape = self.problem.shape(&clips)?;
+        let searched = self.problem.searched(&shape, self.options.seed);
+        let bar = Progress::new(name, usual_evaluations(&clips, searched.unknowns) as u64);
+        let watch = |numbers: &[f64], evaluations: usize| {
+            bar.show(evaluations as u64, &format!("{evaluations} clips simulated"));
+            let step = (numbers.to_vec(), evaluations, began.elapsed().as_secs_f64());
+            steps.lock().expect("no holder panics").push(step);
+            !self.interrupt.asked()
+        };
+        let trail = (Kept::nothing(), "");
+        let at = |found: ObjectFit| (found.at.shared, found.evaluations);
+        let (numbers, evaluations) = match searcher {
+            Searcher::Usual => at(fit_polished(&mut clips, searched, &start, trail, watch)?),
+            Searcher::PosesAlone => fit_poses_alone(&mut clips, searched, &start, watch)?,
+            Searcher::Slopes => at(fit_object(&mut clips, searched.unknowns, &start, trail, watch)?),
+        };
+        let seconds = began.elapsed().as_secs_f64();
+        // What the way cost is measured afterwards: the losses along it are none of the search's own simulations.
+        let loss = SurfaceLoss::new(&clips, &shape);
+        let way = steps.into_inner().expect("no holder panics").into_iter();
+        let way = way.map(|(numbers, n, at)| Ok((n, at, loss.mean(&numbers)?)));
+        let way = way.collect::<Result<Vec<_>, IdentifyError>>()?;
+        Ok(Method { evaluations, seconds, loss_m: loss.mean(&numbers)?, way, ..self.found(name, &numbers)? })
+    }
 
-fn finished(
-    name: &str,
-    problem: &Problem,
-    material: &Material,
-    numbers: &[f64],
-    (evaluations, seconds, loss_m, way): Course,
-) -> Result<Method, IdentifyError> {
-    let theta = problem.settings.theta(numbers);
-    let (gaps, _) = gaps(material, &theta, (None, &theta))?;
-    let mean = |of: &[usize]| Figures::mean(&of.iter().map(|clip| figures(&gaps[*clip])).collect::<Vec<_>>());
-    let named = |(unknown, value): (&Unknown, &f64)| (unknown.name.clone(), *value);
-    let clip = |clip: &usize| {
-        let gap = &gaps[*clip];
-        let [add, add_s] = [gap.object_add_m, gap.object_add_s_m].map(Option::unwrap_or_default);
-        (material.usable[*clip].file.clone(), add, add_s)
-    };
-    Ok(Method {
-        name: name.into(),
-        parameters: problem.unknowns.iter().zip(numbers).map(named).collect(),
-        evaluations,
-        seconds,
-        loss_m,
-        to_target: None,
-        holdout: mean(&material.used.split.confirm),
-        train: mean(&material.used.split.train),
-        clips: material.used.split.confirm.iter().map(clip).collect(),
-        way,
-    })
+    fn slopeless(&self, name: &str, optimizer: Optimizer) -> Result<Method, IdentifyError> {
+        let clips = self.clips()?;
+        let loss = SurfaceLoss::new(&clips, &self.problem.shape(&clips)?);
+        let options = &Options { optimizer, ..self.options.clone() };
+        let run = Run { unknowns: &self.problem.unknowns, random: &[], options, work: Work::passing(self.interrupt) };
+        let began = Instant::now();
+        let Outcome { fit, simulated, convergence, .. } = run.search(&loss, &loss)?;
+        let seconds = began.elapsed().as_secs_f64();
+        let at = |n: f64| seconds * n / simulated.max(1) as f64;
+        let way = convergence.into_iter().map(|[n, loss]| (n as usize, at(n), loss)).collect();
+        let loss_m = loss.mean(&fit.shared)?;
+        Ok(Method { evaluations: simulated, seconds, loss_m, way, ..self.found(name, &fit.shared)? })
+    }
+
+    /// What a way found and how far off that is, without what it cost.
+    fn found(&self, name: &str, numbers: &[f64]) -> Result<Method, IdentifyError> {
+        let Self { problem, material, .. } = *self;
+        let theta = problem.settings.theta(numbers);
+        let (gaps, _) = gaps(material, &theta, (None, &theta))?;
+        let mean = |of: &[usize]| Figures::mean(&of.iter().map(|clip| figures(&gaps[*clip])).collect::<Vec<_>>());
+        let clip = |clip: &usize| {
+            let [add, add_s] = [gaps[*clip].object_add_m, gaps[*clip].object_add_s_m].map(Option::unwrap_or_default);
+            (material.usable[*clip].file.clone(), add, add_s)
+        };
+        Ok(Method {
+            name: name.into(),
+            parameters: problem
+                .unknowns
+                .iter()
+                .map(|unknown| unknown.name.clone())
+                .zip(numbers.iter().copied())
+                .collect(),
+            holdout: mean(&material.used.split.confirm),
+            train: mean(&material.used.split.train),
+            clips: material.used.split.confirm.iter().map(clip).collect(),
+            ..Method::default()
+        })
+    }
 }
 
 /// Width of a column that holds the name of a way of searching.
@@ -253,15 +228,11 @@ impl Comparison {
                 m.loss_m * 1e3
             );
         }
-        let _ = match self.fewer {
-            Some(fewer) => {
-                writeln!(
-                    out,
-                    "by poses alone, {fewer:.1} times fewer clips were simulated than by the swarm for the same loss"
-                )
-            }
-            None => writeln!(out, "by poses alone, the swarm's loss was not reached"),
+        let alone = match self.fewer {
+            Some(fewer) => format!("{fewer:.1} times fewer clips were simulated than by the swarm for the same loss"),
+            None => "the swarm's loss was not reached".into(),
         };
+        let _ = writeln!(out, "by poses alone, {alone}");
         out
     }
 
@@ -282,13 +253,8 @@ impl Comparison {
         line(&format!("{name} on clips held out [cm]"), self.methods.iter().map(|m| m.name.clone()).collect());
         let clips = self.methods.first().map_or(&[][..], |m| &m.clips[..]);
         for (row, (file, ..)) in clips.iter().enumerate() {
-            line(
-                file,
-                self.methods
-                    .iter()
-                    .map(|m| m.clips.get(row).map_or_else(String::new, |c| centimetres(of(c))))
-                    .collect(),
-            );
+            let cell = |m: &Method| m.clips.get(row).map_or_else(String::new, |clip| centimetres(of(clip)));
+            line(file, self.methods.iter().map(cell).collect());
         }
         let means = self.methods.iter().map(|m| mean(&m.holdout).map_or_else(|| "-".into(), centimetres));
         line("mean", means.collect());

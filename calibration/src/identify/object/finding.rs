@@ -122,7 +122,7 @@ mod tests {
 
     fn said(clips: &[Seen], robot: Option<Robot>) -> Identification {
         let cell = Cell { robot, ..Cell::default() };
-        let mut used = Used::of(&[], Vec::new(), 0);
+        let mut used = Used::of([], Vec::new(), 0);
         used.clips.train = vec!["a.mcap".into(), "b.mcap".into()];
         let material = Material { cell, usable: Vec::new(), used, remarks: Vec::new() };
         let mut all = Identification::default();

@@ -4,7 +4,6 @@ use super::Options;
 use crate::identify::error::IdentifyError;
 use crate::identify::used::Used;
 use inference::admit::look::for_object;
-use inference::admit::remarks::reasons;
 use inference::admit::{Looked, Usable};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::console;
@@ -46,16 +45,10 @@ impl Material {
         let remarks = looked.remarks();
         let Looked { usable, left_out } = looked;
         if usable.is_empty() {
-            let reasons = reasons(&left_out);
-            let why = if reasons.is_empty() { "it lists none with an object".into() } else { reasons };
-            return Err(IdentifyError::NoClip {
-                session: options.session.display().to_string(),
-                target: "object",
-                why,
-            });
+            return Err(IdentifyError::no_clip(&options.session, "object", &left_out));
         }
-        let all: Vec<(&str, &Clip)> = usable.iter().map(|usable| (usable.file.as_str(), &usable.clip)).collect();
-        let used = Used::of(&all, left_out, options.seed);
+        let all = usable.iter().map(|usable| (usable.file.clone(), &usable.clip));
+        let used = Used::of(all, left_out, options.seed);
         Ok(Self { cell, usable, used, remarks })
     }
 

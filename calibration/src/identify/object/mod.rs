@@ -26,13 +26,12 @@ mod vicinity;
 
 use super::error::IdentifyError;
 pub use super::options::Options;
-use super::run::{Optimizer, Outcome, Run, Work, concluded};
+use super::run::{Optimizer, Outcome, Run, Work};
 use crate::answer::identification::Identification;
 use inference::controller;
-use inference::engine::Used;
 use inference::estimate::Unknown;
 use inference::interrupt::Interrupt;
-use inference::kept::{self, Fingerprint};
+use inference::kept::Fingerprint;
 use inference::likelihood::Settings;
 use inference::likelihood::object::ObjectClips;
 use inference::likelihood::setting::{complete, object_parameters};
@@ -43,10 +42,9 @@ use parts::disagreement;
 use polish::{Searched, fit_polished};
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::progress::Progress;
-use shared_mem::recording::{Clip, SessionFiles};
+use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
 use shared_mem::toml_file;
-use std::time::Instant;
 use twin::scene::{ObjectModel, ObjectShape};
 
 /// Identifies the object; writes theta.toml where `out` says, with everything that was known before.
@@ -54,25 +52,10 @@ use twin::scene::{ObjectModel, ObjectShape};
 /// # Errors
 /// [`IdentifyError`] naming what is wrong and the remedy.
 pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, IdentifyError> {
-    let began = Instant::now();
-    let material = Material::open(options)?;
-    let parameters = options.parameters.as_deref().map(Theta::read).transpose()?;
-    let engine = options.engine.as_ref();
-    if let Some(engine) = engine {
-        engine.admits(material.usable.iter().map(|usable| &usable.clip))?;
-    }
-    let question = Fingerprint::of("identify object")
-        .with(&(options.optimizer.name(), options.budget, options.seed))
-        .with(&parameters.map(|theta| theta.to_toml()))
-        .with_cell(&material.cell)
-        .with(&engine.map(|engine| engine.ability().print()))
-        .with_clips(material.usable.iter().map(|usable| &usable.clip));
-    let kept = kept::for_work((options.out.as_deref(), &options.session, "identify_object"), &question, interrupt);
-    let work = Work { kept: &kept, interrupt };
-    concluded(identify_kept(&material, options, work), options.out.as_deref(), began, work)
+    identify_material(&Material::open(options)?, options, interrupt)
 }
 
-/// The same from clips in memory; nothing is kept or written.
+/// The same from clips in memory.
 ///
 /// # Errors
 /// As [`identify`].
@@ -82,11 +65,20 @@ pub fn identify_clips(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<Identification, IdentifyError> {
-    let began = Instant::now();
-    let material = Material::of_clips(cell.clone(), clips, options)?;
-    let (mut answer, _) = identify_kept(&material, options, Work::passing(interrupt))?;
-    answer.seconds = began.elapsed().as_secs_f64();
-    Ok(answer)
+    identify_material(&Material::of_clips(cell.clone(), clips, options)?, options, interrupt)
+}
+
+fn identify_material(
+    material: &Material,
+    options: &Options,
+    interrupt: &Interrupt,
+) -> Result<Identification, IdentifyError> {
+    let clips = || material.usable.iter().map(|usable| &usable.clip);
+    if let Some(engine) = &options.engine {
+        engine.admits(clips())?;
+    }
+    let question = options.question("object", options.given()?.as_ref(), &material.cell, clips());
+    options.answered("object", &question, interrupt, |work| identify_kept(material, options, work))
 }
 
 /// The answer, and the parameters that are written.
@@ -104,21 +96,15 @@ fn identify_kept(
     let finding = finding::finding(&problem, &found, disagreement.as_deref().unwrap_or_default());
     let theta = problem.settings.theta(&found.at.shared);
     let mut answer = finding::answer(&finding, &found.at.weights, material);
-    answer.session = options.session.display().to_string();
-    answer.files = SessionFiles { session: options.session.clone(), cell: options.cell.clone() };
     answer.object = material.cell.one_of_several().map(str::to_owned);
-    answer.optimizer = options.optimizer.name().into();
     answer.warnings.extend(problem.warnings.iter().cloned());
     if disagreement.is_none() {
-        answer
-            .warnings
-            .push("ended before parts of the tosses were asked: the intervals are too narrow; run it again".into());
+        let ended = "ended before parts of the tosses were asked: the intervals are too narrow; run it again";
+        answer.warnings.push(ended.into());
     }
     figures::fill(&mut answer, material, [problem.settings.base(), &theta], (engine, &nominal))?;
     let doubts = doubt::doubts(&answer, &material.cell);
     answer.warnings.extend(doubts);
-    answer.engine = engine.map(|engine| engine.used());
-    answer.warnings.extend(answer.engine.iter().flat_map(Used::sentences));
     // Gains of cell.toml were not found.
     let theta = Theta { arm: problem.known.arm.clone(), ..theta };
     Ok((answer, theta))
@@ -136,18 +122,17 @@ struct Problem {
 impl Problem {
     fn new(material: &Material, options: &Options, work: Work<'_>) -> Result<Self, IdentifyError> {
         let Work { kept, interrupt } = work;
-        let mut given = options.parameters.as_deref().map(Theta::read).transpose()?.unwrap_or_default();
-        given = given.about(&material.cell);
+        let mut given = options.given()?.unwrap_or_default().about(&material.cell);
         let mut warnings = Vec::new();
         if given.arm.is_none() && material.cell.robot.is_some() {
             let clips = material.train();
             let hits: Vec<Clip> = clips.into_iter().filter(|clip| clip.kind == ClipKind::ControlHitSlide).collect();
             if !hits.is_empty() {
                 warnings.push("the arm's gains were found first, from the way to the object in the same clips".into());
-                let by = (&material.cell, options.engine.clone());
                 let base = complete(&material.cell, Some(&given))?;
                 let find = || {
-                    let (found, _) = controller::fitted(by, &base, hits, interrupt)?;
+                    let engine = options.engine.clone();
+                    let (found, _) = controller::fitted(&material.cell, engine, &base, hits, interrupt)?;
                     Ok::<_, IdentifyError>(Theta { arm: found.arm, ..given.clone() })
                 };
                 // As text: what a person may read a number of effects in is no plain list of fields.
@@ -161,19 +146,11 @@ impl Problem {
     }
 
     fn search(&self, clips: &mut ObjectClips, options: &Options, work: Work<'_>) -> Result<ObjectFit, IdentifyError> {
-        let run = Run {
-            unknowns: &self.unknowns,
-            random: &[],
-            optimizer: options.optimizer,
-            seed: options.seed,
-            budget: options.budget,
-            kept: work.kept,
-            interrupt: work.interrupt,
-        };
-        if options.optimizer == Optimizer::LeastSquares {
-            return self.least_squares(clips, &run);
-        }
         let shape = self.shape(clips)?;
+        if options.optimizer == Optimizer::LeastSquares {
+            return self.least_squares(clips, self.searched(&shape, options.seed), work);
+        }
+        let run = Run { unknowns: &self.unknowns, random: &[], options, work };
         let outcome = {
             let loss = SurfaceLoss::new(clips, &shape);
             run.search(&loss, &loss)?
@@ -184,15 +161,22 @@ impl Problem {
         Ok(ObjectFit { at, widths, evaluations, convergence, converged })
     }
 
-    fn least_squares(&self, clips: &mut ObjectClips, run: &Run<'_>) -> Result<ObjectFit, IdentifyError> {
-        let start: Vec<f64> = self.unknowns.iter().map(|unknown| unknown.start).collect();
+    fn least_squares(
+        &self,
+        clips: &mut ObjectClips,
+        searched: Searched<'_>,
+        work: Work<'_>,
+    ) -> Result<ObjectFit, IdentifyError> {
         let bar = Progress::new("identify", polish::usual_evaluations(clips, &self.unknowns) as u64);
-        let shape = self.shape(clips)?;
-        let trail = (run.kept, "fit");
-        Ok(fit_polished(clips, self.searched(&shape, run.seed), &start, trail, |_, evaluations| {
+        Ok(fit_polished(clips, searched, &self.start(), (work.kept, "fit"), |_, evaluations| {
             bar.show(evaluations as u64, &format!("{evaluations} clips simulated"));
-            !run.interrupt.asked()
+            !work.interrupt.asked()
         })?)
+    }
+
+    /// Where the search begins.
+    fn start(&self) -> Vec<f64> {
+        self.unknowns.iter().map(|unknown| unknown.start).collect()
     }
 
     fn searched<'a>(&'a self, shape: &'a ObjectShape, seed: u64) -> Searched<'a> {

@@ -31,12 +31,12 @@ impl<'a> SurfaceLoss<'a> {
         Self { clips, points: SurfacePoints::new(shape) }
     }
 
-    /// Mean over all poses of the clips [m], each clip as much as it counts.
+    /// Mean over all poses of the clips [m], all clips counting alike.
     ///
     /// # Errors
     /// [`Impossible`] where the twin has no answer.
-    pub(super) fn mean(&self, numbers: &[f64], weights: &[f64]) -> Result<f64, Impossible> {
-        Ok(self.mean_of(&self.slips(numbers)?, weights))
+    pub(super) fn mean(&self, numbers: &[f64]) -> Result<f64, Impossible> {
+        Ok(self.mean_of(&self.slips(numbers)?, &vec![1.0; self.clips.clips()]))
     }
 
     /// Where poses lie so far from the measured ones, clip by clip: the mean, each clip as much as it counts [m].

@@ -54,8 +54,9 @@ pub(super) fn fit_polished(
     }
     let (numbers, more) = {
         let loss = SurfaceLoss::new(clips, searched.shape);
-        let free = |setting: &Setting| !matches!(setting, Setting::Mass | Setting::CentreOfMass(2));
-        polish(&loss, searched, (&found.at, free), trail, |numbers, more| watch(numbers, found.evaluations + more))
+        let is_held = |k: &usize| matches!(searched.settings[*k], Setting::Mass | Setting::CentreOfMass(2));
+        let free: Vec<usize> = (0..searched.unknowns.len()).filter(|k| !is_held(k)).collect();
+        polish(&loss, searched, &found.at, &free, trail, |numbers, more| watch(numbers, found.evaluations + more))
     };
     // How much wider intervals are is known where the deviance is least; here it may fall to a side.
     let at = linearise_object(clips, searched.unknowns, &numbers)?;
@@ -75,9 +76,9 @@ pub(super) fn fit_poses_alone(
 ) -> Result<(Vec<f64>, usize), Impossible> {
     let (found, evaluations) = roughly(clips, searched.unknowns, start, &watch)?;
     let loss = SurfaceLoss::new(clips, searched.shape);
-    let trail = (Kept::nothing(), "");
+    let (all, trail): (Vec<usize>, Trail<'_>) = ((0..searched.unknowns.len()).collect(), (Kept::nothing(), ""));
     let (numbers, more) =
-        polish(&loss, searched, (&found, |_| true), trail, |numbers, more| watch(numbers, evaluations + more));
+        polish(&loss, searched, &found, &all, trail, |numbers, more| watch(numbers, evaluations + more));
     Ok((numbers, evaluations + more))
 }
 
@@ -86,17 +87,18 @@ pub(super) fn let_go(clips: &ObjectClips) -> bool {
     (0..clips.clips()).any(|clip| clips.clip(clip).kind == ClipKind::FreeMotion)
 }
 
-/// Numbers of little loss near those of `from`, clips counting as they did there, and the clips simulated for it.
+/// Numbers of little loss near those of `from`, clips counting as they did there, and the clips simulated for it. Those that are not
+/// `free` stay.
 fn polish(
     loss: &SurfaceLoss<'_>,
     searched: Searched<'_>,
-    (from, free): (&Linearised, impl Fn(&Setting) -> bool),
+    from: &Linearised,
+    free: &[usize],
     trail: Trail<'_>,
     watch: impl Fn(&[f64], usize) -> bool,
 ) -> (Vec<f64>, usize) {
-    let Searched { unknowns, settings, seed, .. } = searched;
-    let free: Vec<usize> = (0..unknowns.len()).filter(|k| free(&settings[*k])).collect();
-    let spread = spread(&from.information(), &free, unknowns);
+    let Searched { unknowns, seed, .. } = searched;
+    let spread = spread(&from.information(), free, unknowns);
     let place = |z: &[f64]| {
         let mut numbers = from.shared.clone();
         for (k, step) in free.iter().zip((&spread * DVector::from_column_slice(z)).iter()) {
@@ -105,7 +107,7 @@ fn polish(
         numbers
     };
     let (z, simulated) =
-        descend(loss, &from.weights, (free.len(), seed), place, trail, |z, simulated| watch(&place(z), simulated));
+        descend(loss, &from.weights, free.len(), seed, place, trail, |z, simulated| watch(&place(z), simulated));
     (place(&z), simulated)
 }
 

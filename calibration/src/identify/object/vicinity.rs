@@ -55,7 +55,8 @@ struct Asked {
 pub(super) fn descend(
     loss: &SurfaceLoss<'_>,
     weights: &[f64],
-    (coordinates, seed): (usize, u64),
+    coordinates: usize,
+    seed: u64,
     place: impl Fn(&[f64]) -> Vec<f64> + Sync,
     (kept, name): Trail<'_>,
     watch: impl Fn(&[f64], usize) -> bool,
