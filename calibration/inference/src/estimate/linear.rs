@@ -4,7 +4,7 @@
 
 use super::eliminate::Eliminated;
 use super::problem::{ClipModel, Impossible, Random, Unknown};
-use crate::kept::numbers::{matrix, vector, vectors};
+use crate::kept::numbers;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -19,23 +19,23 @@ pub struct ClipFit {
     /// The clip's nuisance parameters there, `Q`.
     pub own: Vec<f64>,
     /// Their covariance given the shared ones, `Q x Q`.
-    #[serde(with = "matrix")]
+    #[serde(with = "numbers")]
     pub own_covariance: DMatrix<f64>,
     /// `-2 ln` of the clip's likelihood with the nuisance parameters integrated out, without the constant of the noise.
     pub deviance: f64,
     /// Half the slope of [`Self::deviance`] by the shared parameters, `P` (the volume term taken as constant).
-    #[serde(with = "vector")]
+    #[serde(with = "numbers")]
     pub gradient: DVector<f64>,
     /// Information on the shared parameters, `P x P`.
-    #[serde(with = "matrix")]
+    #[serde(with = "numbers")]
     pub information: DMatrix<f64>,
     /// What each stretch of the clip adds to [`Self::gradient`]; a single one where the model tells no stretches.
-    #[serde(with = "vectors")]
+    #[serde(with = "numbers")]
     pub scores: Vec<DVector<f64>>,
     /// How the nuisance parameters answer to the shared ones and where they want to go: [`ClipFit::own_part_way`].
-    #[serde(with = "vector")]
+    #[serde(with = "numbers")]
     own_step: DVector<f64>,
-    #[serde(with = "matrix")]
+    #[serde(with = "numbers")]
     own_answer: DMatrix<f64>,
 }
 

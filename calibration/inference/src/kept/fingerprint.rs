@@ -35,6 +35,7 @@ impl Fingerprint {
             self.0.write_u64(number.to_bits());
             count += 1;
         }
+        // Without it two lists would be one with the same numbers.
         self.0.write_usize(count);
         self
     }

@@ -1,71 +1,64 @@
-//! Matrices and vectors of numbers in a file of results: their size and their elements, column by column.
+//! Matrices and vectors of numbers in a file of results, `#[serde(with = "numbers")]`: their size and their elements, column by column.
 
-/// `#[serde(with = "matrix")]`
-pub mod matrix {
-    use nalgebra::DMatrix;
-    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer, de};
+use nalgebra::{DMatrix, DVector};
+use serde::de::{DeserializeOwned, Error as _};
+use serde::{Deserialize as _, Deserializer, Serialize, Serializer};
 
-    /// Rows, columns, elements.
-    ///
-    /// # Errors
-    /// The serializer's.
-    pub fn serialize<S: Serializer>(matrix: &DMatrix<f64>, serializer: S) -> Result<S::Ok, S::Error> {
-        (matrix.nrows(), matrix.ncols(), matrix.as_slice()).serialize(serializer)
+/// Numbers with what a file holds of them.
+pub trait Numbers: Sized {
+    type Held: Serialize + DeserializeOwned;
+
+    fn held(&self) -> Self::Held;
+
+    /// `None` where the size does not fit the elements.
+    fn of(held: Self::Held) -> Option<Self>;
+}
+
+impl Numbers for DMatrix<f64> {
+    type Held = (usize, usize, Vec<f64>);
+
+    fn held(&self) -> Self::Held {
+        (self.nrows(), self.ncols(), self.as_slice().to_vec())
     }
 
-    /// The other way.
-    ///
-    /// # Errors
-    /// The deserializer's, and where the size does not fit the elements.
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<DMatrix<f64>, D::Error> {
-        let (rows, columns, elements) = <(usize, usize, Vec<f64>)>::deserialize(deserializer)?;
-        if rows.checked_mul(columns) != Some(elements.len()) {
-            return Err(de::Error::custom("a matrix of another size"));
-        }
-        Ok(DMatrix::from_vec(rows, columns, elements))
+    fn of((rows, columns, elements): Self::Held) -> Option<Self> {
+        // A product that overflows is no size either.
+        (rows.checked_mul(columns) == Some(elements.len())).then(|| Self::from_vec(rows, columns, elements))
     }
 }
 
-/// `#[serde(with = "vector")]`
-pub mod vector {
-    use nalgebra::DVector;
-    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
+impl Numbers for DVector<f64> {
+    type Held = Vec<f64>;
 
-    /// Its elements.
-    ///
-    /// # Errors
-    /// The serializer's.
-    pub fn serialize<S: Serializer>(vector: &DVector<f64>, serializer: S) -> Result<S::Ok, S::Error> {
-        vector.as_slice().serialize(serializer)
+    fn held(&self) -> Self::Held {
+        self.as_slice().to_vec()
     }
 
-    /// The other way.
-    ///
-    /// # Errors
-    /// The deserializer's.
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<DVector<f64>, D::Error> {
-        Ok(DVector::from_vec(Vec::deserialize(deserializer)?))
+    fn of(held: Self::Held) -> Option<Self> {
+        Some(Self::from_vec(held))
     }
 }
 
-/// `#[serde(with = "vectors")]`
-pub mod vectors {
-    use nalgebra::DVector;
-    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
+impl Numbers for Vec<DVector<f64>> {
+    type Held = Vec<Vec<f64>>;
 
-    /// The elements of each.
-    ///
-    /// # Errors
-    /// The serializer's.
-    pub fn serialize<S: Serializer>(vectors: &[DVector<f64>], serializer: S) -> Result<S::Ok, S::Error> {
-        vectors.iter().map(DVector::as_slice).collect::<Vec<_>>().serialize(serializer)
+    fn held(&self) -> Self::Held {
+        self.iter().map(Numbers::held).collect()
     }
 
-    /// The other way.
-    ///
-    /// # Errors
-    /// The deserializer's.
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<DVector<f64>>, D::Error> {
-        Ok(Vec::<Vec<f64>>::deserialize(deserializer)?.into_iter().map(DVector::from_vec).collect())
+    fn of(held: Self::Held) -> Option<Self> {
+        held.into_iter().map(Numbers::of).collect()
     }
+}
+
+/// # Errors
+/// The serializer's.
+pub fn serialize<N: Numbers, S: Serializer>(numbers: &N, serializer: S) -> Result<S::Ok, S::Error> {
+    numbers.held().serialize(serializer)
+}
+
+/// # Errors
+/// The deserializer's, and where the size does not fit the elements.
+pub fn deserialize<'de, N: Numbers, D: Deserializer<'de>>(deserializer: D) -> Result<N, D::Error> {
+    N::of(N::Held::deserialize(deserializer)?).ok_or_else(|| D::Error::custom("a matrix of another size"))
 }

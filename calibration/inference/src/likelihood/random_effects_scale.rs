@@ -6,7 +6,7 @@
 //! costs no simulation.
 
 use super::random_effects::RandomEffects;
-use crate::kept::numbers::matrix;
+use crate::kept::numbers;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ const REWEIGHTED_STEPS: usize = 12;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Around {
     /// Products of (residual, nuisance parameters), weighted.
-    #[serde(with = "matrix")]
+    #[serde(with = "numbers")]
     pub gram: DMatrix<f64>,
     /// Their values there.
     pub own: Vec<f64>,

@@ -11,7 +11,7 @@
 
 use crate::diagnose::library::{Alternative, Library};
 use inference::estimate::{Eliminated, Impossible};
-use inference::kept::numbers::matrix;
+use inference::kept::numbers;
 use inference::likelihood::random_effects::RandomEffects;
 use inference::likelihood::random_effects_scale::Around;
 use inference::likelihood::{Group, Likelihood, Reach};
@@ -62,7 +62,7 @@ pub struct Swept {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Reduced {
     /// Quadratic form over (residual, columns).
-    #[serde(with = "matrix")]
+    #[serde(with = "numbers")]
     pub form: DMatrix<f64>,
     /// Logarithm of the volume that the nuisance parameters were integrated over; part of the deviance.
     pub volume: f64,
