@@ -174,6 +174,7 @@ impl Kept {
 
     fn save_these(&self, results: &mut Results) {
         let Some(file) = &self.file else { return };
+        // Lent and taken back: a copy would hold all results twice.
         let stored = Stored { question: self.question, by_step: std::mem::take(&mut results.by_step) };
         let bytes = stored.bytes();
         results.by_step = stored.by_step;

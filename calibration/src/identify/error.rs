@@ -1,4 +1,4 @@
-//! Why an arm or an object cannot be identified.
+//! Why an arm, an object or a joint cannot be identified.
 
 use inference::admit::LeftOut;
 use inference::admit::remarks::reasons;
@@ -66,6 +66,22 @@ pub enum IdentifyError {
         /// Reasons, clip by clip.
         why: String,
     },
+    /// No joint of an object is asked for, or its part is not known.
+    #[error("{0}")]
+    Subject(String),
+    /// No part moves on its joint by itself.
+    #[error("no clip of {session} shows `{part}` move by itself: {why}")]
+    NoMotion {
+        session: String,
+        part: String,
+        /// Why not, and what helps.
+        why: String,
+    },
+    /// The motions of a part are not those of one on a joint.
+    #[error(
+        "no friction and damping explain the motions of `{0}`; give the URDF the masses and the axis of the real object"
+    )]
+    NoFit(String),
     /// The twin has no answer.
     #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
     Impossible(#[from] Impossible),

@@ -1,7 +1,7 @@
 //! A fit number by number, for every identification alike: values with their intervals, which numbers hang together, and what one
 //! more recording would bring.
 
-use crate::answer::identification::{Advice, Identification, Parameter};
+use crate::answer::identification::{Advice, Identification, NotIdentifiable, Parameter};
 use crate::words::number_in_words;
 use inference::estimate::{Fit, Intervals, Unknown};
 use inference::likelihood::Setting;
@@ -70,6 +70,18 @@ impl Finding<'_> {
     pub(super) fn nearer_bound(&self, k: usize) -> &'static str {
         let (unknown, value) = (&self.unknowns[k], self.fit.shared[k]);
         if value - unknown.lower < unknown.upper - value { "lower" } else { "upper" }
+    }
+
+    /// Numbers that are not identifiable: those of which `why` gives a reason.
+    pub(super) fn not_identifiable(&self, why: impl Fn(usize) -> Option<String>) -> Vec<NotIdentifiable> {
+        let names = self.unknowns.iter().map(|unknown| unknown.name.clone()).enumerate();
+        names.filter_map(|(k, parameter)| Some(NotIdentifiable { parameter, why: why(k)? })).collect()
+    }
+
+    /// With what a number moves together closely, as a part of a sentence; nothing where there is no such number.
+    pub(super) fn together(&self, k: usize, then: &str) -> String {
+        let said = |(name, r)| format!(" it moves together with {name} (correlation {r:.2}){then}");
+        self.partner(k).map_or_else(String::new, said)
     }
 
     /// The number that one moves together with most closely, and their correlation; `None` where none does closely.

@@ -25,6 +25,7 @@ impl Used {
 
     /// What a reader has to know about them; `another`: what to record where nothing could be held out.
     pub(super) fn warnings(&self, another: &str) -> Vec<String> {
+        // A split holds nothing out of a single command.
         let alone = self.split.confirm.is_empty().then(|| {
             format!(
                 "there is a single motion, so nothing could be held out: how far off the twin is elsewhere is not known; record {another}"

@@ -31,6 +31,7 @@ impl<'a> Command<'a> {
         let farthest = rows.iter().map(|row| away(desired, *row, 0)).reduce(f64::max)?;
         let backwards: Vec<usize> = rows.iter().rev().copied().collect();
         let from = leaves(desired, &rows, SAME_POSITION).unwrap_or(0.0);
+        // An arm that never moves arrives where it left.
         let to = leaves(desired, &backwards, SAME_POSITION).unwrap_or(from).max(from);
         let half_way = leaves(desired, &rows, 0.5 * farthest).unwrap_or(0.0);
         Some(Self { desired, moves: [from, to], half_way })
@@ -48,6 +49,7 @@ impl<'a> Command<'a> {
         }
         let same_at = |place: usize| {
             let time = self.moves[0] + self.duration() * place as f64 / (TIMES - 1) as f64;
+            // Of the other at the moment that lies as far from its half way: stamps and rests before the motion are its own.
             let [q, of_other] =
                 [(self, time), (other, time - self.half_way + other.half_way)].map(|(command, time)| command.at(time));
             q.iter().zip(&of_other).all(|(a, b)| (a - b).abs() < SAME_POSITION)
@@ -93,6 +95,7 @@ pub fn by_command<'a>(clips: impl IntoIterator<Item = &'a Clip>) -> Vec<Vec<usiz
     let same = |a: usize, b: usize| commands[a].as_ref().zip(commands[b].as_ref()).is_some_and(|(a, b)| a.is(b));
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for clip in 0..commands.len() {
+        // Held against the first of a group alone: along a chain of clips that are nearly the same, small differences add up.
         match groups.iter_mut().find(|group| same(group[0], clip)) {
             Some(group) => group.push(clip),
             None => groups.push(vec![clip]),

@@ -46,6 +46,7 @@ pub(super) fn part(clip: &Clip, [from_ns, to_ns]: [u64; 2]) -> Clip {
     let (mut measured, desired) =
         (clip.measured.between(from_ns..=to_ns), clip.desired.between(commanded_from_ns..=to_ns));
     if let (Some(first), Some(half)) = (measured.stamps_ns.first(), smoothing::half_width(&clip.measured.stamps_ns)) {
+        // At an edge of the clip rows lie on one side alone, and a slope through them is late.
         let inside = clip.measured.stamps_ns[0] + half <= *first;
         let speeds = smoothing::motion(&clip.measured, &[*first], half).dq;
         measured.dq.iter_mut().zip(speeds).filter(|_| inside).for_each(|(dq, smoothed)| *dq = smoothed);
@@ -77,6 +78,7 @@ fn liveliest_part(commands: &JointSeries, measured: &JointSeries, most: f64) -> 
     let step_ns = ((most * PARTS_APART * 1e9) as usize).max(1);
     let starts = (*first..=last.saturating_sub(length_ns).max(*first)).step_by(step_ns);
     let way = ways(commands);
+    // Behind the last command nothing is sent any farther.
     let at = |ns: u64| way[commands.stamps_ns.partition_point(|stamp| *stamp < ns).min(way.len() - 1)];
     let gone = |from: u64| at(from + length_ns) - at(from);
     // Of several that are alike the first.

@@ -28,6 +28,7 @@ pub(super) fn mended(mut clip: Clip, cell: &Cell) -> (Clip, Vec<String>) {
     let all = clip.object.len();
     let place = |row: usize| clip.object.poses[row].isometry().translation.vector;
     let mistake = |row: usize| {
+        // The first pose and the last have one neighbour: which of the two is wrong is not known.
         if row == 0 || row + 1 >= all {
             return false;
         }
@@ -51,6 +52,7 @@ pub(super) fn mended(mut clip: Clip, cell: &Cell) -> (Clip, Vec<String>) {
 /// at first: the tracker lost the object and published on.
 fn stood_still(series: &mut ObjectSeries) -> Option<String> {
     let poses = &series.poses;
+    // Of a tracker without noise an object at rest repeats its pose from the beginning on: there a repeat says nothing.
     if poses.windows(2).take(REPEATS_OF_A_LOST_OBJECT).any(|pair| pair[0] == pair[1]) {
         return None;
     }
@@ -78,6 +80,7 @@ fn turn_back(series: &mut ObjectSeries, cell: &Cell) -> usize {
         .map(|axis| UnitQuaternion::from_axis_angle(&axis, std::f64::consts::PI));
     let mut flips = 0;
     for row in 1..series.len() {
+        // The one before is turned back already, so that a run of poses on the wrong side is turned as a whole.
         let before = series.poses[row - 1].isometry().rotation;
         let pose = series.poses[row].isometry();
         if is_box && before.angle_to(&pose.rotation) > HALF_TURN {

@@ -7,6 +7,7 @@ use crate::likelihood::object::Clearance;
 use nalgebra::Vector3;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::{Clip, ObjectSeries};
+use shared_mem::time::seconds_between;
 use twin::replay::{Buried, object_start};
 use twin::scene::{ObjectModel, ObjectShape};
 
@@ -15,6 +16,10 @@ use twin::scene::{ObjectModel, ObjectShape};
 const LOST_STEP: f64 = 0.03;
 /// No table reaches so far [m] (a choice): poses in millimetres do.
 const FARTHEST_TABLE: f64 = 20.0;
+/// Fewer poses show no slide (a choice).
+const FEWEST_POSES: usize = 10;
+/// An object that goes farther than this from one pose to the next moves [m] (a choice: beyond a tracker's noise).
+const STEP_IN_MOTION: f64 = 1.5e-3;
 /// Share of poses that may be missing (a choice).
 const MAX_SHARE_OF_MISTAKES: f64 = 0.1;
 /// Longest time without a pose while the object moves [s] (a choice).
@@ -66,7 +71,7 @@ fn on_table(clip: &Clip, cell: &Cell) -> Result<Option<String>, Buried> {
 
 fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
     let ObjectSeries { stamps_ns, poses } = &clip.object;
-    if poses.len() < 10 {
+    if poses.len() < FEWEST_POSES {
         return Some(format!("it holds {} object poses; the tracker has to see the whole slide", poses.len()));
     }
     let place = |row: usize| poses[row].isometry().translation.vector;
@@ -74,9 +79,10 @@ fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
     if farthest > FARTHEST_TABLE {
         return Some(format!("its poses lie up to {farthest:.0} m from the arm's base: publish them in metres"));
     }
-    let seconds = |a: usize, b: usize| (stamps_ns[b] - stamps_ns[a]) as f64 * 1e-9;
+    let seconds = |a: usize, b: usize| seconds_between(stamps_ns[a], stamps_ns[b]);
     let step = |row: &usize| (place(*row) - place(row - 1)).norm();
     let speed = |row: usize| if (1..poses.len()).contains(&row) { step(&row) / seconds(row - 1, row) } else { 0.0 };
+    // Beyond what the faster of its neighbouring steps leads to expect: a hit is followed by steps as long, a lost pose by none.
     let jump = |row: &usize| step(row) - speed(row - 1).max(speed(row + 1)) * seconds(row - 1, *row);
     if let Some(row) = (1..poses.len()).find(|row| jump(row) > LOST_STEP) {
         let (at, far) = (seconds(0, row), step(&row) * 1e3);
@@ -84,14 +90,15 @@ fn unusable(clip: &Clip, cell: &Cell) -> Option<String> {
             "the tracker lost the object: its pose jumps by {far:.0} mm at {at:.2} s and stays there"
         ));
     }
-    let missing = poses.len() as f64 / (seconds(0, poses.len() - 1) * rate(&clip.object)?).max(1.0);
-    if missing < 1.0 - MAX_SHARE_OF_MISTAKES {
-        return Some(format!("{:.0} % of its poses are missing", 100.0 * (1.0 - missing)));
+    let there = poses.len() as f64 / (seconds(0, poses.len() - 1) * rate(&clip.object)?).max(1.0);
+    if there < 1.0 - MAX_SHARE_OF_MISTAKES {
+        return Some(format!("{:.0} % of its poses are missing", 100.0 * (1.0 - there)));
     }
-    let moving: Vec<usize> = (1..poses.len()).filter(|row| step(row) > 1.5e-3).collect();
-    if let Some(row) = moving.iter().find(|row| seconds(**row - 1, **row) > LONGEST_GAP) {
-        return Some(format!("the object was not seen for {:.2} s while it moved", seconds(row - 1, *row)));
+    let mut moving = (1..poses.len()).filter(|row| step(row) > STEP_IN_MOTION);
+    if let Some(row) = moving.find(|row| seconds(row - 1, *row) > LONGEST_GAP) {
+        return Some(format!("the object was not seen for {:.2} s while it moved", seconds(row - 1, row)));
     }
+    // What was let go may lie still, tumble and come to rest on any face.
     if clip.kind == ClipKind::FreeMotion {
         return None;
     }

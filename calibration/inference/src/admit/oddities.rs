@@ -2,6 +2,7 @@
 
 use crate::statistics::median;
 use shared_mem::recording::ObjectSeries;
+use shared_mem::time::seconds_between;
 
 /// Fewest poses a second that show a slide [Hz] (a choice).
 const SLOWEST_TRACKER: f64 = 20.0;
@@ -30,7 +31,7 @@ fn slow(series: &ObjectSeries) -> Option<String> {
 fn cut_short(series: &ObjectSeries) -> Option<String> {
     let last = series.len().checked_sub(1)?;
     let before = last.checked_sub(LAST_POSES)?;
-    let seconds = |row: usize| (series.stamps_ns[row] - series.stamps_ns[0]) as f64 * 1e-9;
+    let seconds = |row: usize| seconds_between(series.stamps_ns[0], series.stamps_ns[row]);
     let place = |row: usize| series.poses[row].isometry().translation.vector;
     let speed = (place(last) - place(before)).norm() / (seconds(last) - seconds(before));
     (speed > STILL_MOVING).then(|| {

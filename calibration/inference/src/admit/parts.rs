@@ -27,6 +27,7 @@ impl Admitted {
     pub fn in_parts(self) -> Self {
         let few =
             self.commands < COMMANDS_TO_CHOOSE_BY && self.clips.iter().all(|clip| clip.kind == ClipKind::Excitation);
+        // The shortest clip of a command decides: all its clips are cut into as many parts.
         let seconds = |group: &Vec<usize>| {
             let of = |clip: &usize| span(&self.clips[*clip]);
             group.iter().map(of).map(|[from, to]| seconds_between(from, to)).fold(f64::INFINITY, f64::min)

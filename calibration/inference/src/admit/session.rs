@@ -142,6 +142,7 @@ pub fn admit(session: &Session) -> Result<Admitted, Refused> {
     let (files, mut clips): (Vec<String>, Vec<Clip>) = usable.into_iter().map(|clip| (clip.file, clip.clip)).unzip();
     let tracking = is_tracking(cell);
     check_channels(&clips, tracking)?;
+    // Before clips are cut to length: the liveliest parts of one command need not be the same.
     let groups = by_command(&clips);
     if groups.len() < FEWEST_COMMANDS {
         return Err(too_few_commands(groups.len(), clips.len(), &left_out));

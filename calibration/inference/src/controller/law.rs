@@ -22,9 +22,6 @@ const FITS_AS_WELL_WITHIN: f64 = 1.1;
 
 /// The cell with the law that fits its clips best, and a sentence about it; `None` where cell.toml states the law, or there is no
 /// law to find. `given`: parameters that are known already.
-///
-/// # Errors
-/// [`ControllerError`] when the arm cannot be simulated under any law.
 pub(super) fn found(
     cell: &Cell,
     clips: &[Clip],
@@ -43,6 +40,7 @@ pub(super) fn found(
         left.extend(rest.map(|rest| (kind, rest)));
     }
     let least = left.iter().map(|(_, rest)| *rest).fold(f64::INFINITY, f64::min);
+    // The first in the order of [`LAWS`], not the best: gains make up for what tells laws apart.
     let best = left.iter().find(|(_, rest)| *rest < FITS_AS_WELL_WITHIN * least);
     Ok(best.map(|(kind, _)| (under(cell, *kind), sentence(*kind, &left))))
 }

@@ -106,6 +106,7 @@ fn of_clip(cell: &Cell, arm: &ArmModel, clip: &Clip) -> Option<Sums> {
         let added = compensation(controller.kind, arm, &state, &of(&ddq_d));
         for (joint, (normal, right)) in sums.iter_mut().enumerate() {
             let k = row * dof + joint;
+            // Behind the gears nothing is felt of the torque that turns the rotor itself.
             let torque = tau[k] + rotor[joint] * ddq[k] - added[joint];
             let x = DVector::from_vec(vec![torque, dq_d[k] - dq[k], dq[k], (dq[k] / DRY_FRICTION_FULL_AT).tanh(), 1.0]);
             *right += (q_d[k] - q[k]) * &x;
@@ -131,6 +132,7 @@ fn compensation(kind: ControllerKind, arm: &ArmModel, state: &JointState, ddq_d:
 /// `None` where a fit has none, or they are too far apart.
 fn stiffness(sums: &[Sums], joint: usize) -> Option<[f64; 3]> {
     let mut all = Vec::new();
+    // Without the last column, which takes a wrong zero, and with it.
     for columns in [COLUMNS - 1, COLUMNS] {
         let left_out = std::iter::once(None).chain((0..sums.len()).map(Some));
         for left_out in left_out {
@@ -141,11 +143,13 @@ fn stiffness(sums: &[Sums], joint: usize) -> Option<[f64; 3]> {
                 normal += clip[joint].0.view((0, 0), (columns, columns));
                 right += clip[joint].1.rows(0, columns);
             }
+            // What gives way against the torque is no spring: then something else acts, and no fit of this joint counts.
             all.push(compliance(normal, right).filter(|compliance| *compliance > 0.0)?.recip());
         }
     }
     let least = all.iter().copied().fold(f64::INFINITY, f64::min);
     let most = all.iter().copied().fold(0.0, f64::max);
+    // Known by its order of magnitude: the mean of logarithms.
     let middle = (all.iter().map(|k| k.ln()).sum::<f64>() / all.len() as f64).exp();
     (most < LARGEST_SPREAD * least).then_some([least, middle, most])
 }
@@ -153,6 +157,7 @@ fn stiffness(sums: &[Sums], joint: usize) -> Option<[f64; 3]> {
 /// The first coefficient, columns that never change being left out.
 fn compliance(mut normal: DMatrix<f64>, mut right: DVector<f64>) -> Option<f64> {
     let scales: Vec<f64> = (0..right.len()).map(|k| normal[(k, k)].sqrt()).collect();
+    // Columns have units of their own: scaled, so that one bound of eigenvalues serves all of them.
     for (i, scale) in scales.iter().enumerate() {
         if *scale > 0.0 {
             right[i] /= scale;

@@ -96,6 +96,7 @@ fn choose(dof: usize, all: &[Tried], settings: &[Setting], unknowns: &mut [Unkno
         |delay: f64| (0..dof).map(|joint| best(delay, joint).map_or(f64::INFINITY, |t| t.costs[joint])).sum::<f64>();
     let delays = all.iter().map(|tried| tried.delay);
     let Some(delay) = delays.min_by(|a, b| total(*a).total_cmp(&total(*b))) else { return };
+    // The delay is one for all joints, so its column is taken from the first.
     for (k, (setting, unknown)) in settings.iter().zip(unknowns).enumerate() {
         let joint = setting.joint().unwrap_or(0);
         if let Some(tried) = best(delay, joint).filter(|tried| tried.costs[joint].is_finite()) {

@@ -59,9 +59,6 @@ pub struct Ability {
 
 impl Ability {
     /// From its own words.
-    ///
-    /// # Errors
-    /// What is wrong with them.
     pub(super) fn read(hello: Hello) -> Result<Self, String> {
         let Hello { protocol, name, parameters, effects, readings, object } = hello;
         if !(OLDEST..=VERSION).contains(&protocol) {

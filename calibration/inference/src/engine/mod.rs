@@ -185,8 +185,12 @@ impl Engine {
     /// What it was used for so far.
     pub fn used(&self) -> Used {
         let count = |counter: &AtomicUsize| counter.load(Ordering::Relaxed);
-        let asked_for = (&self.call.command[..], self.with_object.load(Ordering::Relaxed));
-        Used::new(&self.ability, asked_for, [count(&self.asked), count(&self.started_again)])
+        Used {
+            command: self.call.command.clone(),
+            rollouts: count(&self.asked),
+            started_again: count(&self.started_again),
+            ..Used::of(&self.ability, self.with_object.load(Ordering::Relaxed))
+        }
     }
 
     /// States at the times that were asked for, row by row: of each quantity of the question's `readings`, a number for each joint. Behind

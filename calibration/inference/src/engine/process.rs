@@ -70,7 +70,7 @@ impl Process {
         let (Some(stdin), Some(stdout), Some(stderr)) = pipes else { return Err(fail("it has no pipes".into())) };
         let (requests, asked) = channel();
         let (answered, answers) = channel();
-        std::thread::spawn(move || serve((stdin, stdout), &asked, &answered));
+        std::thread::spawn(move || serve(stdin, stdout, &asked, &answered));
         let last_words = Arc::default();
         let words = Arc::clone(&last_words);
         std::thread::spawn(move || listen(stderr, &words));
@@ -162,7 +162,8 @@ impl Drop for Process {
 
 /// Takes each message to the process and its answer back, until one side has ended.
 fn serve(
-    (mut stdin, stdout): (ChildStdin, ChildStdout),
+    mut stdin: ChildStdin,
+    stdout: ChildStdout,
     asked: &Receiver<Asked>,
     answered: &Sender<Result<Frame, FrameError>>,
 ) {

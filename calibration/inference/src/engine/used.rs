@@ -5,7 +5,7 @@ use serde::Serialize;
 use twin::effects::registry;
 
 /// An engine, and what it was used for.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Used {
     /// Its name and version.
     pub name: String,
@@ -24,15 +24,12 @@ pub struct Used {
 }
 
 impl Used {
-    pub(super) fn new(
-        ability: &Ability,
-        (command, object): (&str, bool),
-        [rollouts, started_again]: [usize; 2],
-    ) -> Self {
+    /// An engine that was asked for an arm, or for an object too.
+    pub(super) fn of(ability: &Ability, object: bool) -> Self {
         let all = || registry().iter().filter(|effect| is_simulated(effect, object)).map(|effect| effect.name);
         let added = all().filter(|name| !ability.knows(name)).map(str::to_owned).collect();
         let simulates = ability.effects().filter(|name| all().any(|other| other == *name)).map(str::to_owned).collect();
-        Self { name: ability.name.clone(), command: command.into(), object, simulates, added, rollouts, started_again }
+        Self { name: ability.name.clone(), object, simulates, added, ..Self::default() }
     }
 
     /// The same for a person, a sentence each.

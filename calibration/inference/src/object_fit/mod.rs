@@ -204,6 +204,7 @@ fn model_error(clips: &ObjectClips, at: &Linearised) -> Result<ModelError, Impos
     let pose = |part: Part, alike: f64| {
         let place = rms(&|channel, of| of == part && matches!(channel, Channel::Position(0 | 1)));
         let turn = rms(&|channel, of| of == part && channel == Channel::Rotation(2));
+        // Never quite nothing: a clip that fits by chance would outweigh all others.
         let beyond = |rms: f64, noise: f64| (rms * rms - noise * noise).max(0.01 * noise * noise).sqrt() * alike;
         PoseNoise { position: beyond(place, noise.position), rotation: beyond(turn, noise.rotation) }
     };

@@ -143,7 +143,8 @@ impl Question<'_> {
                     risen += there.cost(self.random, &at.weights) - here;
                 }
             }
-            // Both sides together: one alone may fall by chance where the hit is rough.
+            // Both sides together: one alone may fall by chance where the hit is rough. Where both fall, the interval is as wide as it
+            // may be.
             *width = (promised / risen.max(1e-9)).sqrt().clamp(1.0, MAX_WIDENING);
         }
         Ok((widths, strokes.evaluations))

@@ -40,9 +40,6 @@ pub(super) struct Measures {
 }
 
 /// Opens the confirm clips.
-///
-/// # Errors
-/// [`DiagnoseError`] when the twin has no answer on them.
 pub(super) fn measure<E: Evidence>(case: &Case<'_, E>) -> Result<Measures, DiagnoseError> {
     let Case { bench, found, session, admitted, options, .. } = *case;
     let weights = &case.first().weights[..];

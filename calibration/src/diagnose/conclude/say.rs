@@ -54,9 +54,6 @@ fn about(session: &Session, options: &Options, site: &Site, verdict: Verdict, ne
 }
 
 /// Says what was measured and decided.
-///
-/// # Errors
-/// [`DiagnoseError`] when a clip cannot be replayed.
 pub(super) fn say<E: Evidence>(
     case: &Case<'_, E>,
     measures: Measures,

@@ -84,6 +84,7 @@ impl Finding<'_> {
             let gap = self.left.iter().any(|left| left.gaps() > 1.0);
             return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
         }
+        // A substitute is pushed beyond its range to close a gap that is not its own, and does not close it whole.
         let pushed = self.implausible && self.percent() < BELIEVED_BEYOND_RANGE;
         if pushed
             || !self.within_tolerance[1]

@@ -90,6 +90,7 @@ fn alone(fit: &Fit) -> f64 {
             DMatrix::from_diagonal(&clip.information.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 }));
         let scaled = &scale * &clip.information * &scale + DMatrix::identity(n, n) * RIDGE;
         let gradient = &scale * &clip.gradient;
+        // By how much a Newton step of this clip alone would lower its squared error.
         let gain = scaled.cholesky().map_or(0.0, |factor| gradient.dot(&factor.solve(&gradient)));
         (1.0 - gain / clip.chi2.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
     };
@@ -123,6 +124,7 @@ fn delay(numbers: &[f64], model: &Model<'_>, clips: &Used) -> Option<(f64, f64)>
             }
         }
     }
+    // Each joint's sums over its squared error, so that a joint that follows badly does not speak for all.
     let moving: Vec<[f64; 3]> = sums.into_iter().filter(|[_, speed, error]| *speed > 0.0 && *error > 0.0).collect();
     let weighted = |k: usize| moving.iter().map(|sums| sums[k] / sums[2]).sum::<f64>();
     let (cross, speed, all) = (weighted(0), weighted(1), moving.len() as f64);

@@ -8,6 +8,7 @@ use crate::identify::figures::{Odd, USE_FITTED, USE_HELD_OUT, gap, odd};
 use crate::identify::used::Used;
 use inference::estimate::{Random, Schedule, Subset, score};
 use rayon::prelude::*;
+use shared_mem::time::seconds_between;
 
 /// Points of a picture's line (a choice: one in two pixels).
 const POINTS_OF_A_LINE: usize = 400;
@@ -98,7 +99,7 @@ fn errors(model: &Model<'_>, clip: usize, random: &[Random], numbers: &[f64]) ->
     let measured = &clip.recorded.measured;
     let (mut times, mut rows) = (Vec::new(), Vec::new());
     for row in clip.averaged().flatten().copied() {
-        times.push((measured.stamps_ns[row] - measured.stamps_ns[0]) as f64 * 1e-9);
+        times.push(seconds_between(measured.stamps_ns[0], measured.stamps_ns[row]));
         let pairs = measured.q_row(row).iter().zip(&predicted[row].state.q).enumerate();
         rows.push(pairs.map(|(joint, (q, p))| if clip.dead[joint] { 0.0 } else { q - p }).collect());
     }

@@ -33,6 +33,7 @@ pub(super) fn improve(
     bring_near(model, clips, settings, unknowns, interrupt);
     for k in 0..settings.len() {
         let Some(joint) = limited(&settings[k]) else { continue };
+        // Limits that were found before are among them: a joint that is clipped moves what hangs on it.
         let numbers: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
         let cost = |inverse: f64| {
             let mut numbers = numbers.clone();

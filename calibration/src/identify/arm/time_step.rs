@@ -15,9 +15,6 @@ const RICHARDSON: f64 = 4.0 / 3.0;
 const SHARE_LEFT_OPEN: f64 = 0.25;
 
 /// How far the numbers of a fit to the clips in `train` move once the time step is taken out.
-///
-/// # Errors
-/// [`Impossible`] where the twin has no answer in half steps.
 pub(super) fn error(
     model: &Model<'_>,
     train: &[usize],

@@ -31,12 +31,7 @@ pub(super) fn not_identifiable(
 ) -> Vec<NotIdentifiable> {
     // A swarm ends with its budget; least squares that do not arrive have lost their way.
     let lost = !finding.arrived && optimizer == Optimizer::LeastSquares;
-    let all = 0..finding.unknowns.len();
-    all.filter_map(|k| {
-        let why = why(finding, k, model, clips).or_else(|| lost.then(|| DID_NOT_ARRIVE.to_owned()))?;
-        Some(NotIdentifiable { parameter: finding.unknowns[k].name.clone(), why })
-    })
-    .collect()
+    finding.not_identifiable(|k| why(finding, k, model, clips).or_else(|| lost.then(|| DID_NOT_ARRIVE.to_owned())))
 }
 
 fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Option<String> {
@@ -73,9 +68,7 @@ fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Opti
              faster motions, and log them faster"
         ));
     }
-    let together = finding
-        .partner(k)
-        .map_or_else(String::new, |(name, r)| format!(" it moves together with {name} (correlation {r:.2}) and"));
+    let together = finding.together(k, " and");
     Some(format!("its 95 % interval is ±{percent:.0} %:{together} {moves}; record larger and faster motions"))
 }
 

@@ -28,6 +28,7 @@ mod subject;
 mod tests;
 mod together;
 
+use super::error::IdentifyError;
 use crate::answer::identification::Identification;
 use alone::Alone;
 use fit::{Found, held_out, scored};
@@ -38,15 +39,17 @@ use model::{Motion, travel};
 use noise::Noise;
 use positions::Positions;
 use rayon::prelude::*;
-use shared_mem::output::{self, OutputError};
+use shared_mem::output;
 use shared_mem::progress::Progress;
-use shared_mem::recording::{Clip, ReadError, Session};
-use std::path::PathBuf;
+use shared_mem::recording::{Clip, Session};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use subject::Subject;
-use twin::arm::{ModelError, with_files_found_from, with_joint_friction};
+use twin::arm::{with_files_found_from, with_joint_friction};
 use twin::world::LoneJoint;
 
+/// Said of a user's end.
+const INTERRUPTED: &str = "interrupted; it takes seconds, and the same command begins anew";
 /// A part that rests nearer than this to the end of its joint's range may lie on a stop, as a share of the range (a choice).
 const NEAR_A_STOP: f64 = 0.02;
 
@@ -63,37 +66,6 @@ pub struct Options {
     pub joint: Option<String>,
     /// Where the URDF with what was found goes.
     pub out: Option<PathBuf>,
-}
-
-/// The joint cannot be identified.
-#[derive(Debug, thiserror::Error)]
-pub enum JointError {
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// The joint, or its part.
-    #[error("{0}")]
-    Subject(String),
-    /// There is nothing to identify.
-    #[error("no clip of {session} shows `{part}` move by itself: {why}")]
-    NoMotion {
-        session: String,
-        part: String,
-        /// Why not, and what helps.
-        why: String,
-    },
-    /// The motions are no motions of a part on a joint.
-    #[error(
-        "no friction and damping explain the motions of `{0}`; give the URDF the masses and the axis of the real object"
-    )]
-    NoFit(String),
-    /// The URDF cannot be changed.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The URDF cannot be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-    #[error("interrupted; it takes seconds, and the same command begins anew")]
-    Interrupted,
 }
 
 /// A clip, and the motions in it.
@@ -116,8 +88,8 @@ struct Material {
 /// Finds friction and damping of a joint.
 ///
 /// # Errors
-/// [`JointError`] in one line.
-pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, JointError> {
+/// [`IdentifyError`] in one line.
+pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identification, IdentifyError> {
     let begun = Instant::now();
     let session = Session::open_with(&options.session, options.cell.as_deref())?;
     let bar = Progress::new("joint", 4);
@@ -129,10 +101,10 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     if motions.is_empty() {
         return Err(no_motion(&session, &material));
     }
-    let go_on = || if interrupt.asked() { Err(JointError::Interrupted) } else { Ok(()) };
+    let go_on = || if interrupt.asked() { Err(IdentifyError::Interrupted(INTERRUPTED.into())) } else { Ok(()) };
     go_on()?;
     let known = [material.subject.joint.friction, material.subject.joint.damping];
-    let part = || JointError::NoFit(material.subject.bodies[1].clone());
+    let part = || IdentifyError::NoFit(material.subject.bodies[1].clone());
     let found = Found::of(&motions, &material.noise).ok_or_else(part)?;
     bar.show(2, "held out");
     go_on()?;
@@ -150,9 +122,9 @@ pub fn identify(options: &Options, interrupt: &Interrupt) -> Result<Identificati
     Ok(answer)
 }
 
-fn material(session: &Session, options: &Options) -> Result<Material, JointError> {
-    let subject =
-        Subject::of(&session.cell, options.object.as_deref(), options.joint.as_deref()).map_err(JointError::Subject)?;
+fn material(session: &Session, options: &Options) -> Result<Material, IdentifyError> {
+    let subject = Subject::of(&session.cell, options.object.as_deref(), options.joint.as_deref())
+        .map_err(IdentifyError::Subject)?;
     let in_question = session.cell.object_name();
     let look = |clip: Clip| Ok((Positions::of(&clip, in_question, &subject)?, Vec::new()));
     let Looked { usable, mut left_out } = Looked::of_session(session, |_| true, look);
@@ -222,12 +194,12 @@ impl Material {
     }
 }
 
-fn no_motion(session: &Session, material: &Material) -> JointError {
+fn no_motion(session: &Session, material: &Material) -> IdentifyError {
     let mut why = reasons(&material.left_out);
     if let Some(holds) = material.holds_in_words() {
         why = format!("{why}; {holds}");
     }
-    JointError::NoMotion {
+    IdentifyError::NoMotion {
         session: session.folder.display().to_string(),
         part: material.subject.bodies[1].clone(),
         why,
@@ -235,12 +207,7 @@ fn no_motion(session: &Session, material: &Material) -> JointError {
 }
 
 /// The URDF with what was found; nothing is written where the clips do not even tell what slows the part in all.
-fn write(
-    out: &std::path::Path,
-    subject: &Subject,
-    found: &Found,
-    answer: &mut Identification,
-) -> Result<(), JointError> {
+fn write(out: &Path, subject: &Subject, found: &Found, answer: &mut Identification) -> Result<(), IdentifyError> {
     if !found.tells_sum() {
         answer.warnings.push(format!("{} is not written: the clips do not tell what slows the part", out.display()));
         return Ok(());

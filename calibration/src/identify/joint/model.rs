@@ -80,6 +80,7 @@ impl Motion {
 
     /// Where a fit of its start begins: a line through its first rows.
     fn start(&self) -> [f64; 2] {
+        // Over so short a part friction hardly bends the way.
         let rows = (self.times.len() / 8).max(ROWS_OF_A_START).min(self.times.len());
         let Line { middle: [t, q], slope, .. } = Line::through(&self.times[..rows], &self.positions[..rows]);
         [q - slope * t, slope]
@@ -168,7 +169,8 @@ impl ClipModel for Motions<'_> {
     }
 }
 
-/// The best fit of both numbers to motions, from a start at which the one prevails and one at which the other does.
+/// The best fit of both numbers to motions, from a start at which the one prevails and one at which the other does: they imitate each
+/// other.
 pub(super) fn best_fit(motions: &[Motion]) -> Option<Fit> {
     let (model, own) = (Motions(motions), Motions::own());
     let unknowns = model.unknowns();

@@ -4,6 +4,7 @@ use super::subject::Subject;
 use inference::statistics::median;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use shared_mem::recording::{Clip, ObjectSeries};
+use shared_mem::time::seconds_between;
 use std::f64::consts::{PI, TAU};
 use twin::scene::joint_position;
 
@@ -28,10 +29,7 @@ pub(super) struct Positions {
 }
 
 impl Positions {
-    /// Of a clip, whose object in question is called `in_question`.
-    ///
-    /// # Errors
-    /// Why the clip is of no use, in one line.
+    /// Of a clip, whose object in question is called `in_question`; or why the clip is of no use, in one line.
     pub(super) fn of(clip: &Clip, in_question: Option<&str>, subject: &Subject) -> Result<Self, String> {
         let series = |name: &String| {
             let other = || clip.others.iter().find(|other| other.name == *name).map(|other| &other.series);
@@ -73,7 +71,7 @@ impl Positions {
                 turned * 180.0 / PI
             ));
         }
-        let times = stamps.iter().map(|stamp| (stamp - stamps[0]) as f64 * 1e-9).collect();
+        let times = stamps.iter().map(|stamp| seconds_between(stamps[0], *stamp)).collect();
         Ok(Self { times, positions, carrier: mean(&carriers) })
     }
 }

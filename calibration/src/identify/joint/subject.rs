@@ -23,10 +23,7 @@ pub(super) struct Subject {
 }
 
 impl Subject {
-    /// The joint of this name on the object of this name; where none is named, the only one.
-    ///
-    /// # Errors
-    /// What is missing, and what to do about it, in one line.
+    /// The joint of this name on the object of this name, where none is named the only one; or what is missing, and what to do about it.
     pub(super) fn of(cell: &Cell, object: Option<&str>, joint: Option<&str>) -> Result<Self, String> {
         let articulated = || cell.objects.iter().filter(|object| object.urdf.is_some());
         let found = choose(articulated(), object, |one: &&Object| one.name.clone().unwrap_or_default(), "--object")

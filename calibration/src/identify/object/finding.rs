@@ -2,7 +2,7 @@
 
 use super::Problem;
 use super::material::Material;
-use crate::answer::identification::{Identification, NotIdentifiable};
+use crate::answer::identification::Identification;
 use crate::identify::finding::Finding;
 use inference::likelihood::Setting;
 use inference::object_fit::ObjectFit;
@@ -51,10 +51,7 @@ pub(super) fn answer(finding: &Finding<'_>, weights: &[f64], material: &Material
                 .into(),
         );
     }
-    let open = |k: usize| {
-        Some(NotIdentifiable { parameter: finding.unknowns[k].name.clone(), why: why(finding, k, material)? })
-    };
-    answer.not_identifiable = (0..finding.unknowns.len()).filter_map(open).collect();
+    answer.not_identifiable = finding.not_identifiable(|k| why(finding, k, material));
     let motion = if material.cell.robot.is_some() { "stroke" } else { "toss" };
     let more = finding.fit.clips.iter().zip(&answer.clips.train);
     let more = more.map(|(clip, file)| (format!("one more {motion} like {file}"), clip.information.clone()));
@@ -90,9 +87,7 @@ fn why(finding: &Finding<'_>, k: usize, material: &Material) -> Option<String> {
     if !relative && half <= OPEN_FROM_SHARE_OF_RANGE * range(finding, k) {
         return None;
     }
-    let together = finding
-        .partner(k)
-        .map_or_else(String::new, |(name, r)| format!(" it moves together with {name} (correlation {r:.2});"));
+    let together = finding.together(k, ";");
     let unit = setting.physical_unit();
     let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
     Some(format!("its 95 % interval is as wide as ±{half:.3}{unit};{together} {remedy}"))

@@ -32,9 +32,6 @@ impl<'a> SurfaceLoss<'a> {
     }
 
     /// Mean over all poses of the clips [m], all clips counting alike.
-    ///
-    /// # Errors
-    /// [`Impossible`] where the twin has no answer.
     pub(super) fn mean(&self, numbers: &[f64]) -> Result<f64, Impossible> {
         Ok(self.mean_of(&self.slips(numbers)?, &vec![1.0; self.clips.clips()]))
     }
@@ -50,9 +47,6 @@ impl<'a> SurfaceLoss<'a> {
     }
 
     /// How far the simulated object lies from the measured one, clip by clip, pose by pose that counts.
-    ///
-    /// # Errors
-    /// [`Impossible`] where the twin has no answer.
     pub(super) fn slips(&self, numbers: &[f64]) -> Result<Vec<Vec<Slip>>, Impossible> {
         (0..self.clips.clips()).map(|clip| self.of_clip(clip, numbers)).collect()
     }

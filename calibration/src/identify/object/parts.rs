@@ -22,9 +22,6 @@ const FEWEST_OF_A_PART: usize = 4;
 
 /// Half of the 95 % interval of every number by what parts of the clips disagree; 0 where the clips are no tosses or too
 /// few. `None`: the user asked for the end.
-///
-/// # Errors
-/// [`IdentifyError`] when a part cannot be simulated.
 pub(super) fn disagreement(
     at: &[f64],
     clips: &ObjectClips,

@@ -38,9 +38,6 @@ pub(super) fn usual_evaluations(clips: &ObjectClips, unknowns: &[Unknown]) -> us
 
 /// The likelihood fit and, of strokes, from there on to the paper's loss. What was let go begins with a motion of its own,
 /// which the loss does not know. `watch` sees numbers and clips simulated after every step; `false` ends the fit there.
-///
-/// # Errors
-/// [`Impossible`] when the cell cannot be simulated at the start.
 pub(super) fn fit_polished(
     clips: &mut ObjectClips,
     searched: Searched<'_>,
@@ -65,9 +62,6 @@ pub(super) fn fit_polished(
 
 /// By the loss alone, whatever the arm felt: numbers and clips simulated. A comparison with searches that know nothing
 /// else; the mass comes out wrong.
-///
-/// # Errors
-/// As [`fit_polished`].
 pub(super) fn fit_poses_alone(
     clips: &mut ObjectClips,
     searched: Searched<'_>,
@@ -116,6 +110,7 @@ fn spread(information: &DMatrix<f64>, free: &[usize], unknowns: &[Unknown]) -> D
     let n = free.len();
     let range = |k: usize| unknowns[free[k]].upper - unknowns[free[k]].lower;
     let on_diagonal = |i: usize, j: usize, value: f64| if i == j { value } else { 0.0 };
+    // As if each were known to its range besides: of what the clips do not tell the covariance is that wide and no wider.
     let held = |i: usize, j: usize| information[(free[i], free[j])] + on_diagonal(i, j, range(i).powi(-2));
     let covariance = DMatrix::from_fn(n, n, held).try_inverse().unwrap_or_else(|| DMatrix::zeros(n, n));
     let blurred = |i: usize, j: usize| covariance[(i, j)] + on_diagonal(i, j, (MIN_SPREAD_SHARE * range(i)).powi(2));

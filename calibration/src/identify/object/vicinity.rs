@@ -125,6 +125,7 @@ impl Vicinity {
             return None;
         }
         let away = |point: &Asked| point.at.iter().zip(middle).map(|(x, m)| (x - m).powi(2)).sum::<f64>();
+        // Square roots of the weights: they stand on both sides of the normal equations.
         let counts = |point: &Asked| (-0.25 * away(point) / (n as f64 * (1.5 * width).powi(2))).exp();
         let roots: Vec<f64> = asked.iter().map(counts).collect();
         let x = DMatrix::from_fn(asked.len(), n + 1, |i, k| {
@@ -134,6 +135,7 @@ impl Vicinity {
         let went: Vec<Vec<f64>> = asked.iter().map(went).collect();
         let y = DMatrix::from_fn(asked.len(), 6 * poses.iter().sum::<usize>(), |i, k| roots[i] * went[i][k]);
         let mut gram = x.tr_mul(&x);
+        // Slopes alone are held back, not the value at the middle.
         for k in 1..=n {
             gram[(k, k)] += SLOPE_RIDGE * width * width;
         }
