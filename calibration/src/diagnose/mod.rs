@@ -45,7 +45,7 @@ pub use crate::answer::diagnosis::{
 
 pub use work::{DiagnoseError, Options, peaks};
 
-use conclude::case::Case;
+use conclude::Case;
 use fit::bench::Bench;
 use inference::admit::{Admitted, Refused, Split, admit, torques};
 use inference::controller;

@@ -60,11 +60,6 @@ pub(super) struct Outcome {
     pub(super) arrived: bool,
 }
 
-/// Steps of a search, by name.
-fn step(name: &str) -> Fingerprint {
-    Fingerprint::of(name)
-}
-
 impl Run<'_> {
     /// Searches; `model` has the clips to be fitted, `first` those of them that a rough fit may begin with.
     pub(super) fn search<M: ClipModel>(&self, model: &M, first: &impl ClipModel) -> Result<Outcome, IdentifyError> {
@@ -93,7 +88,7 @@ impl Run<'_> {
         let Self { unknowns, random, work: Work { kept, interrupt }, .. } = *self;
         let all = Watched { model, watch };
         type Way = (Underway, Vec<[f64; 2]>);
-        let (now, way): Way = match kept.known(&step("way")) {
+        let (now, way): Way = match kept.known(&Fingerprint::of("way")) {
             Some(known) => known,
             None => {
                 let mut start: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
@@ -115,7 +110,7 @@ impl Run<'_> {
             if way.len() < now.fit.history.len() {
                 way.push([watch.simulated() as f64, now.fit.deviance()]);
             }
-            kept.keep(&step("way"), &(now, &*way));
+            kept.keep(&Fingerprint::of("way"), &(now, &*way));
             !interrupt.asked()
         })?;
         let rows = fit.clips.iter().map(|clip| clip.rows).sum::<usize>().max(1) as f64;
@@ -133,7 +128,7 @@ impl Run<'_> {
     ) -> Result<Outcome, IdentifyError> {
         let all = Watched { model, watch };
         let Work { kept, interrupt } = self.work;
-        let answers: Vec<Vec<f64>> = kept.known(&step("answers")).unwrap_or_default();
+        let answers: Vec<Vec<f64>> = kept.known(&Fingerprint::of("answers")).unwrap_or_default();
         watch.already(answers.iter().map(Vec::len).sum::<usize>() * model.clips());
         let mut so_far = answers.clone();
         let found: Found = minimise(
@@ -147,7 +142,7 @@ impl Run<'_> {
                     return false;
                 }
                 so_far.push(costs.to_vec());
-                kept.keep(&step("answers"), &so_far);
+                kept.keep(&Fingerprint::of("answers"), &so_far);
                 true
             },
         );
@@ -218,9 +213,14 @@ impl<'a> Watch<'a> {
         self.done.load(Ordering::Relaxed)
     }
 
-    fn one_more(&self) {
+    /// Counts a clip that is to be simulated; once the user asked for the end none is.
+    fn one_more(&self) -> Result<(), Impossible> {
+        if self.interrupt.asked() {
+            return Err(Impossible("interrupted".into()));
+        }
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         self.bar.show(done as u64, &format!("{done} clips simulated"));
+        Ok(())
     }
 }
 
@@ -236,12 +236,8 @@ impl<M: ClipModel> ClipModel for Watched<'_, M> {
     }
 
     fn residuals(&self, clip: usize, shared: &[f64], own: &[f64], out: &mut Vec<f64>) -> Result<(), Impossible> {
-        if self.watch.interrupt.asked() {
-            return Err(Impossible("interrupted".into()));
-        }
-        let answer = self.model.residuals(clip, shared, own, out);
-        self.watch.one_more();
-        answer
+        self.watch.one_more()?;
+        self.model.residuals(clip, shared, own, out)
     }
 
     fn stepped(
@@ -251,12 +247,8 @@ impl<M: ClipModel> ClipModel for Watched<'_, M> {
         from: ((&[f64], &[f64]), &[f64]),
         out: &mut Vec<f64>,
     ) -> Result<(), Impossible> {
-        if self.watch.interrupt.asked() {
-            return Err(Impossible("interrupted".into()));
-        }
-        let answer = self.model.stepped(clip, to, from, out);
-        self.watch.one_more();
-        answer
+        self.watch.one_more()?;
+        self.model.stepped(clip, to, from, out)
     }
 
     fn stretches(&self, clip: usize) -> Vec<usize> {

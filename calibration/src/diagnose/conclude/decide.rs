@@ -1,7 +1,7 @@
 //! From what was measured to the verdict: the finding is drawn from the search, and where nothing explains all of the gap, what is
 //! proven to explain a part of it.
 
-use super::case::Case;
+use super::Case;
 use super::measure::Measures;
 use super::verdict::{Decision, Finding};
 use crate::answer::diagnosis::Kind;

@@ -1,6 +1,6 @@
 //! What the confirm clips say of the baseline and of what the search found: they are opened here, and only here.
 
-use super::case::Case;
+use super::Case;
 use crate::answer::diagnosis::{Place, SensorGap};
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::confirm::{Confirmation, confirm};

@@ -3,7 +3,6 @@
 //!
 //! | module | |
 //! |---|---|
-//! | [`case`] | what an answer is drawn from |
 //! | `measure` | what the confirm clips say |
 //! | `verdict`, `decide` | which of the five verdicts it is |
 //! | `headline` | its sentence |
@@ -14,7 +13,6 @@
 //! | `say` | the answer |
 
 pub mod advice;
-pub mod case;
 mod decide;
 mod headline;
 mod measure;
@@ -28,10 +26,47 @@ pub mod written;
 
 pub use say::not_testable;
 
-use super::work::DiagnoseError;
+use super::work::{DiagnoseError, Options};
 use crate::answer::diagnosis::Diagnosis;
-use case::Case;
+use crate::answer::effect_in_words;
+use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::parameters;
+use crate::diagnose::judge::trial::{Found, Step};
+use inference::admit::{Admitted, Split};
 use inference::likelihood::Evidence;
+use shared_mem::recording::Session;
+
+/// A search that came to its end, and all that its answer is drawn from.
+pub struct Case<'a, E> {
+    pub bench: &'a Bench<'a, E>,
+    pub split: &'a Split,
+    pub found: &'a Found,
+    pub session: &'a Session,
+    pub admitted: &'a Admitted,
+    pub options: &'a Options,
+}
+
+impl<E: Evidence> Case<'_, E> {
+    /// The step that the search began with: it extends the baseline.
+    fn first(&self) -> &Step {
+        &self.found.steps[0]
+    }
+
+    /// Weights of the channels in the last step of the search.
+    fn last_weights(&self) -> &[f64] {
+        &self.found.steps.last().unwrap_or(self.first()).weights
+    }
+
+    /// Name of a candidate.
+    fn name(&self, effect: usize) -> &'static str {
+        self.bench.library.candidates[effect].effect.name
+    }
+
+    /// `command delay (delay 11.9 ms)`.
+    fn with_size(&self, hypothesis: &Hypothesis, effect: usize) -> String {
+        effect_in_words(self.name(effect), &parameters::of_effect(self.bench, hypothesis, effect))
+    }
+}
 
 /// Opens the confirm clips and says what was found.
 ///

@@ -1,7 +1,7 @@
 //! What is said of every candidate: how likely it is, how much it shrinks the gap, and what became of it. `reason.rs`
 //! says why.
 
-use super::case::Case;
+use super::Case;
 use super::decide::Decided;
 use super::measure::Measures;
 use super::reason::{Judged, reason};

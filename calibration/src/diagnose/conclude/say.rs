@@ -1,6 +1,6 @@
 //! The answer: the verdict in its sentence, what to do about it, what to record next, and all figures.
 
-use super::case::Case;
+use super::Case;
 use super::decide::{Decided, sureness};
 use super::headline::{self, Facts, NotProven};
 use super::measure::Measures;

@@ -50,7 +50,7 @@ pub(in crate::diagnose) enum Capture {
 }
 
 /// A session and what can be recorded into it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Site {
     /// The session that clips are added to.
     folder: PathBuf,
@@ -129,15 +129,10 @@ impl Site {
             cell: folder.join("cell.toml"),
             folder,
             arm: Some("sim".into()),
-            origin: String::new(),
-            is_new: false,
             strokes,
             clips,
             fastest,
-            alone: false,
-            torques: false,
-            object: None,
-            page: None,
+            ..Self::default()
         }
     }
 

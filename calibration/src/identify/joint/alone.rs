@@ -1,7 +1,6 @@
 //! Where in a clip the part moves by itself. What pushes it is not recorded, so the last stretch of each motion counts, from the
 //! earliest row on from which friction and weight alone explain it until it rests or runs into something.
 
-use super::agreement::disagreement;
 use super::model::{Line, Motion, best_fit, travel};
 use super::noise::Noise;
 use super::positions::Positions;
@@ -149,7 +148,7 @@ fn cut(clip: &Positions, joint: &LoneJoint, noise: &Noise, rows: Range<usize>) -
 /// Whether some friction and damping leave of a motion what noise leaves.
 fn explains(motion: &Motion, noise: &Noise) -> bool {
     best_fit(std::slice::from_ref(motion))
-        .is_some_and(|fit| disagreement(motion, [fit.shared[0], fit.shared[1]], &fit.clips[0].own, noise) <= 1.0)
+        .is_some_and(|fit| motion.disagreement([fit.shared[0], fit.shared[1]], &fit.clips[0].own, noise) <= 1.0)
 }
 
 impl Alone {

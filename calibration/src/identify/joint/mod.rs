@@ -9,14 +9,12 @@
 //! | `subject` | which joint, its file, its part |
 //! | `positions` | where the joint is over a clip |
 //! | `noise` | how noisy that is |
-//! | `model` | what friction and damping make of a motion |
+//! | `model` | what friction and damping make of a motion, and whether what they leave is noise |
 //! | `alone` | where in a clip the part moves by itself |
-//! | `agreement` | whether what is left of a motion is noise |
 //! | `together` | beginnings cut off and motions left out on which not all agree |
 //! | `fit` | both numbers, their intervals, what is not identifiable |
 //! | `figures` | the answer |
 
-mod agreement;
 mod alone;
 mod figures;
 mod fit;

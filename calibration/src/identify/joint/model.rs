@@ -2,6 +2,7 @@
 //!
 //! Each motion has its own start, position and velocity, which its rows alone say: eliminated with priors so wide that they say nothing.
 
+use super::noise::Noise;
 use inference::estimate::{ClipModel, Fit, Impossible, Place, Random, Schedule, Unknown, fit_from};
 use inference::statistics::extent;
 use twin::world::LoneJoint;
@@ -60,6 +61,10 @@ pub(super) struct Motion {
     pub(super) joint: LoneJoint,
 }
 
+/// Stretches whose mean residual must be that of noise, and by how many standard deviations it may be off, as the mean square may
+/// (choices).
+const STRETCHES: usize = 6;
+const SIGMAS_OF_DISAGREEMENT: f64 = 3.5;
 /// Fewest rows from which a start is read (a choice).
 const ROWS_OF_A_START: usize = 3;
 
@@ -102,6 +107,23 @@ impl Motion {
             state.0
         };
         self.times.iter().map(row).collect()
+    }
+
+    /// How far what this friction and damping leave is beyond what noise leaves, as a share of what is allowed: at most 1 where they
+    /// agree.
+    pub(super) fn disagreement(&self, numbers: [f64; 2], own: &[f64], noise: &Noise) -> f64 {
+        let predicted = self.predicted(numbers, own);
+        let off: Vec<f64> =
+            self.positions.iter().zip(&predicted).map(|(measured, p)| (measured - p) / self.sigma).collect();
+        let rows = off.len();
+        let square = off.iter().map(|x| x * x).sum::<f64>() / rows as f64;
+        // A mean square of n independent residuals scatters by the root of 2 / n.
+        let in_all = square / (1.0 + SIGMAS_OF_DISAGREEMENT * (2.0 / noise.independent(rows)).sqrt());
+        let stretches = STRETCHES.min(rows / 3).max(1);
+        off.chunks(rows.div_ceil(stretches)).fold(in_all, |most, stretch| {
+            let mean = stretch.iter().sum::<f64>() / stretch.len() as f64;
+            most.max(mean.abs() * noise.independent(stretch.len()).sqrt() / SIGMAS_OF_DISAGREEMENT)
+        })
     }
 
     /// Friction that stops the part within so many seconds, with no other resistance, and the damping whose time constant they are.

@@ -1,12 +1,10 @@
 //! The motions of one joint together: the end of a push cut off where the other motions say that it is none, and motions left out that
 //! the others do not explain.
 
-use super::agreement::disagreement;
 use super::alone::{Alone, MIN_KEPT_TRAVEL, TRIED_BEGINNINGS};
 use super::fit::held_out;
 use super::model::{Motion, best_fit};
 use super::noise::Noise;
-use inference::estimate::Fit;
 
 /// A motion from which the others lead farther away than this share of its travel is none of the same joint by itself (a choice).
 const MAX_DISAGREEMENT: f64 = 0.1;
@@ -19,7 +17,8 @@ pub(super) fn cut_to_agree(motions: &mut [Alone], noise: &Noise) {
     for _ in 0..TRIED_BEGINNINGS * motions.len() {
         let all: Vec<Motion> = motions.iter().map(|alone| alone.motion.clone()).collect();
         let Some(fit) = best_fit(&all) else { return };
-        let off = |k: &usize| of(&fit, *k, &motions[*k].motion, noise);
+        let numbers = [fit.shared[0], fit.shared[1]];
+        let off = |k: &usize| motions[*k].motion.disagreement(numbers, &fit.clips[*k].own, noise);
         let worst = (0..motions.len()).filter(|k| !stays[*k]).max_by(|a, b| off(a).total_cmp(&off(b)));
         let Some(worst) = worst.filter(|k| off(k) > 1.0) else { return };
         let step = whole[worst].rows.len().div_ceil(TRIED_BEGINNINGS);
@@ -40,8 +39,4 @@ pub(super) fn odd(motions: &[Motion]) -> Option<usize> {
         .map(|(fit, motion)| (fit.chi2 / fit.rows as f64).sqrt() * motion.sigma / motion.travel())
         .collect();
     (0..off.len()).max_by(|a, b| off[*a].total_cmp(&off[*b])).filter(|worst| off[*worst] > MAX_DISAGREEMENT)
-}
-
-fn of(fit: &Fit, k: usize, motion: &Motion, noise: &Noise) -> f64 {
-    disagreement(motion, [fit.shared[0], fit.shared[1]], &fit.clips[k].own, noise)
 }
