@@ -102,7 +102,7 @@ pub fn regenerate(sessions: &[Labelled]) -> Vec<Regenerated> {
     };
     let named = || all().filter(|session| session.is_named_rightly());
     let beside = |sensors| {
-        beyond_noise(named().filter_map(|s| s.of(sensors)).filter(|of| has_a_gap(of)).map(|of| (of.after, of.floor)))
+        beyond_noise(named().filter_map(|s| s.of(sensors)).filter(|of| of.gaps() > 1.0).map(|of| (of.after, of.floor)))
     };
     let share_left = |sensors| quantile(named().filter_map(|session| session.share_left(sensors)));
     let said = |kind| all().filter(move |session| session.is(kind));
@@ -160,33 +160,17 @@ impl Labelled {
 
     /// Of sensors that have a gap.
     fn share_left(&self, sensors: Sensors) -> Option<f64> {
-        let of = self.of(sensors).filter(|of| has_a_gap(of))?;
+        let of = self.of(sensors).filter(|of| of.gaps() > 1.0)?;
         Some((of.after - of.floor).max(0.0) / (of.before - of.floor))
     }
 
     fn has_a_plain_gap(&self) -> bool {
-        self.said.gap.sensors.iter().any(is_plain)
+        self.said.gap.sensors.iter().any(SensorGap::is_plain)
     }
 
     /// The largest gap of its sensors, in least gaps.
     fn gaps(&self) -> f64 {
-        let of = |gap: &SensorGap| (gap.before - gap.floor) / least_gap(gap.sensors);
-        self.said.gap.sensors.iter().map(of).fold(0.0, f64::max)
-    }
-}
-
-fn is_plain(of: &SensorGap) -> bool {
-    of.before - of.floor > criteria::plain_excess(of.sensors == Sensors::Object)
-}
-
-fn has_a_gap(of: &SensorGap) -> bool {
-    of.before - of.floor > least_gap(of.sensors)
-}
-
-fn least_gap(sensors: Sensors) -> f64 {
-    match sensors {
-        Sensors::Joints => criteria::JOINTS_EXCESS.value,
-        Sensors::Object => criteria::OBJECT_EXCESS.value,
+        self.said.gap.sensors.iter().map(SensorGap::gaps).fold(0.0, f64::max)
     }
 }
 

@@ -88,9 +88,4 @@ pub const NAMED_IS_WRONG: Criterion = criterion(
 pub const MOST_OF_IT: f64 = 0.5;
 
 /// Excess from which on a gap is plain, over what a cause may leave of the joints', and over the least gap of an object (a choice).
-const PLAIN_EXCESS: f64 = 3.0;
-
-/// An excess is plain from here on [squared sigmas].
-pub fn plain_excess(of_object: bool) -> f64 {
-    PLAIN_EXCESS * if of_object { OBJECT_EXCESS.value } else { JOINTS_EXCESS_BESIDE_A_CAUSE.value }
-}
+pub const PLAIN_EXCESS: f64 = 3.0;

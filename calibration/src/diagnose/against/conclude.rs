@@ -9,7 +9,7 @@ use super::scores::Score;
 use super::search::{Found, Step, Trial, smallest_seen};
 use super::subjects::Subject;
 use super::turned::Side;
-use crate::answer::diagnosis::{Clips, Kind, Share, Status};
+use crate::answer::diagnosis::{Clips, Kind, SensorGap, Share, Status};
 use crate::diagnose::conclude::advice;
 use crate::diagnose::conclude::site::{Advice, Site};
 use crate::diagnose::criteria::{CLASS_IS_RIGHT, UNKNOWN_IS_RIGHT};
@@ -17,7 +17,6 @@ use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::localise;
-use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes::Sizes;
 use crate::diagnose::select::gain::SAME_WORTH_NATS;
 use crate::diagnose::work::{DiagnoseError, Options};
@@ -67,8 +66,11 @@ pub(super) fn conclude<E: Evidence>(
     let believed = matches!(kind, Kind::Named | Kind::Class);
     let after = if believed { &with } else { &before };
     let fits = if believed { &held_out } else { &under_a };
-    let gap = Sizes::of(pair_bench.bench, ([&under_a, fits], [&before, after]), session, &case.pair.admitted)?
-        .gap(([&before, after], Left::of_all_sensors(&before.typical(), &after.typical())), options.seed);
+    let gap = Sizes::of(pair_bench.bench, ([&under_a, fits], [&before, after]), session, &case.pair.admitted)?.gap(
+        [&before, after],
+        SensorGap::of_groups(&before.typical(), &after.typical()),
+        options.seed,
+    );
     let (gap_of_a, places) = (of_a(pair_bench, case), localise::localise(pair_bench.bench.evidence, &before));
     let candidates = candidates(pair_bench, case, kind, &rivals, &before, options.seed);
     let changes: Vec<String> = if believed { named(case, &rivals) } else { Vec::new() };
@@ -118,7 +120,7 @@ fn deviates<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Opti
         pair_bench.split.open().into_iter().partition(|clip| pair_bench.is_of_b(*clip));
     let b = pair_bench.left(case.found.without.model.of(Side::B), &of_b)?;
     let a = pair_bench.left(&case.of_a.full, &of_a)?;
-    let groups = Left::of_groups(&b.typical(), &a.typical());
+    let groups = SensorGap::of_groups(&b.typical(), &a.typical());
     let more = groups.iter().filter(|left| left.gaps() > 1.0).map(|left| left.before / left.after);
     more.filter(|times| *times > MIN_TIMES_OF_A).max_by(f64::total_cmp)
 }

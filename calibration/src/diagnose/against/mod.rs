@@ -34,10 +34,10 @@ pub use pair::{Pair, Unlike};
 
 use super::work::{self, DiagnoseError, Options, Question, Work};
 
+use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::stages;
 use crate::diagnose::judge::gap::Residuals;
-use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::search::baseline::{self, Baseline};
 use fits::PairBench;
 use inference::admit::{COMMANDS_TO_CHOOSE_BY, Refused, Split, torques};
@@ -156,7 +156,7 @@ impl Question for Changed<'_> {
 /// Whether the parameters alone leave of A so little beyond the noise that an effect has nothing to explain.
 fn is_explained<E: Evidence>(bench: &Bench<'_, E>, of_a: &Split, baseline: &Hypothesis) -> bool {
     let Some(left) = Residuals::at(bench, baseline, &of_a.open()) else { return false };
-    Left::of_groups(&left.typical(), &left.typical()).iter().all(|left| left.gaps() < MAX_GAPS_OF_NOTHING)
+    SensorGap::of_groups(&left.typical(), &left.typical()).iter().all(|left| left.gaps() < MAX_GAPS_OF_NOTHING)
 }
 
 /// So much of the least gap is none: engines that integrate in other steps differ by less.

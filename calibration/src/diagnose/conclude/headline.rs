@@ -289,10 +289,10 @@ mod tests {
 
     #[test]
     fn where_only_the_arm_is_explained_it_is_said_what_the_object_leaves() {
-        use crate::diagnose::judge::remainder::Left;
+        use crate::answer::diagnosis::{SensorGap, Sensors};
         let mut found = finding(vec!["command_delay"], 5e5, 1.5);
         let arm = found.left[0];
-        found.left.push(Left { of_object: true, before: 301.0, after: 91.0, ..arm });
+        found.left.push(SensorGap { sensors: Sensors::Object, before: 301.0, after: 91.0, ..arm });
         let text = said(&found, &["command delay"]);
         assert!(text.starts_with("command delay causes the arm's part of the gap"), "{text}");
         assert!(

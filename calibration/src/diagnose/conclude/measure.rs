@@ -7,7 +7,6 @@ use crate::diagnose::judge::confirm::{Confirmation, confirm};
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out::{self, Fits};
 use crate::diagnose::judge::localise::localise;
-use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes;
 use crate::diagnose::work::DiagnoseError;
 use inference::likelihood::Evidence;
@@ -29,9 +28,7 @@ pub(super) struct Measures {
     /// All that the search found.
     pub(super) with: OnConfirm,
     /// The gap before and after, of every group of sensors, in a clip like most.
-    pub(super) left: Vec<Left>,
-    /// The same for diagnosis.json.
-    pub(super) sensors: Vec<SensorGap>,
+    pub(super) left: Vec<SensorGap>,
     pub(super) confirmation: Confirmation,
     /// Of every step of the search.
     pub(super) overdispersion: Vec<f64>,
@@ -54,8 +51,7 @@ pub(super) fn measure<E: Evidence>(case: &Case<'_, E>) -> Result<Measures, Diagn
     let both = [(&without.fits, &without.left), (&with.fits, &with.left)];
     let fits_and_left = ([&without.fits, &with.fits], [&without.left, &with.left]);
     Ok(Measures {
-        left: Left::of_groups(&before, &after),
-        sensors: Left::of_all_sensors(&before, &after),
+        left: SensorGap::of_groups(&before, &after),
         confirmation: confirm(bench, weights, both, options.seed)?,
         overdispersion: found.overdispersion(bench),
         within_tolerance: sizes::within_tolerance(bench, fits_and_left, session, admitted)?,

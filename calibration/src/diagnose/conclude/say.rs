@@ -82,7 +82,7 @@ pub(super) fn say<E: Evidence>(
     let traced = if nearest.is_some() { after } else { shown.left };
     let remedies = remedies::of(&verdict, &theta, &session.cell);
     Ok(Diagnosis {
-        gap: sizes.gap(([before, shown.left], measures.sensors.clone()), options.seed),
+        gap: sizes.gap([before, shown.left], measures.left.clone(), options.seed),
         candidates: ranked::candidates(case, &measures, decided, verdict.kind),
         remedies,
         clips: clips(admitted, case.split),

@@ -1,9 +1,8 @@
 //! The finding: one of five verdicts, with the effects and how sure it is. [`super::headline`] says it in a sentence.
 
-use crate::answer::diagnosis::{Basis, Kind, Verdict};
+use crate::answer::diagnosis::{Basis, Kind, SensorGap, Verdict};
 use crate::diagnose::criteria::{CLASS_IS_RIGHT, NONE_IS_RIGHT, UNKNOWN_IS_RIGHT, UNKNOWN_OF_LITTLE_IS_RIGHT};
 use crate::diagnose::judge::confidence;
-use crate::diagnose::judge::remainder::Left;
 use std::time::Duration;
 
 /// What a verdict is drawn from.
@@ -20,7 +19,7 @@ pub(super) struct Finding<'a> {
     /// Whether all of them act on the arm.
     pub(super) of_arm: bool,
     /// The gap before and after, of every group of sensors.
-    pub(super) left: Vec<Left>,
+    pub(super) left: Vec<SensorGap>,
     /// Whether the gap shrinks on the clips that were kept for confirming.
     pub(super) confirmed: bool,
     /// Whether an effect is stronger than what is plausible.
@@ -88,7 +87,7 @@ impl Finding<'_> {
         let pushed = self.implausible && self.percent() < BELIEVED_BEYOND_RANGE;
         if pushed
             || !self.within_tolerance[1]
-                && self.left.iter().any(|left| left.too_much(self.clear) && !(left.of_object && self.moves_the_arm()))
+                && self.left.iter().any(|left| left.too_much(self.clear) && !(left.of_object() && self.moves_the_arm()))
         {
             return self.unexplained();
         }
@@ -96,14 +95,14 @@ impl Finding<'_> {
     }
 
     /// The first group of sensors of which the effects leave too much.
-    pub(in crate::diagnose) fn open(&self) -> Option<&Left> {
+    pub(in crate::diagnose) fn open(&self) -> Option<&SensorGap> {
         self.left.iter().find(|left| left.too_much(self.clear))
     }
 
     /// Whether the effects are what moves the arm, whatever an object does besides: a gap that is plain, and a cause that
     /// leaves nothing of it.
     fn moves_the_arm(&self) -> bool {
-        let arm = self.left.iter().find(|left| !left.of_object);
+        let arm = self.left.iter().find(|left| !left.of_object());
         self.of_arm && arm.is_some_and(|arm| arm.is_plain() && arm.explained() > 1.0 - arm.substitute())
     }
 
@@ -113,7 +112,7 @@ impl Finding<'_> {
     }
 
     fn none(&self) -> Decision {
-        let nothing = self.left.iter().map(Left::is_nothing).fold(1.0, f64::min);
+        let nothing = self.left.iter().map(SensorGap::is_nothing).fold(1.0, f64::min);
         // What is of no interest is a matter of size, which is measured.
         let nothing = if self.within_tolerance[0] { 1.0 } else { nothing };
         Decision { kind: Kind::None, effects: Vec::new(), confidence: NONE_IS_RIGHT.value * nothing, little: false }
@@ -131,11 +130,11 @@ impl Finding<'_> {
 
     /// How much of what is not noise the effects explain, in the group of sensors in which they explain most [%].
     fn percent(&self) -> f64 {
-        100.0 * self.left.iter().map(Left::explained).fold(0.0, f64::max)
+        100.0 * self.left.iter().map(SensorGap::explained).fold(0.0, f64::max)
     }
 
     fn unexplained(&self) -> Decision {
-        let plain = self.drift.is_some() || self.left.iter().any(Left::is_plain);
+        let plain = self.drift.is_some() || self.left.iter().any(SensorGap::is_plain);
         let confidence = if plain { UNKNOWN_IS_RIGHT.value } else { UNKNOWN_OF_LITTLE_IS_RIGHT.value };
         Decision { kind: Kind::Unexplained, effects: Vec::new(), confidence, little: !plain }
     }
@@ -167,9 +166,10 @@ impl Verdict {
 #[cfg(test)]
 pub(in crate::diagnose) mod tests {
     use super::*;
+    use crate::answer::diagnosis::Sensors;
 
     pub(in crate::diagnose) fn finding<'a>(effects: Vec<&'a str>, before: f64, after: f64) -> Finding<'a> {
-        let left = vec![Left { before, after, floor: 1.0, of_object: false }];
+        let left = vec![SensorGap { sensors: Sensors::Joints, before, after, floor: 1.0 }];
         Finding {
             effects,
             rivals: Vec::new(),
@@ -196,7 +196,7 @@ pub(in crate::diagnose) mod tests {
     fn the_larger_the_residuals_the_less_sure_it_is_that_nothing_is_there() {
         let object = |before: f64| {
             let mut nothing = finding(vec![], before, before);
-            nothing.left[0].of_object = true;
+            nothing.left[0].sensors = Sensors::Object;
             nothing.decide()
         };
         let (near, rough, far) = (object(1.5), object(10.5), object(16.0));
@@ -248,7 +248,7 @@ pub(in crate::diagnose) mod tests {
     fn where_only_the_arm_is_explained_its_cause_is_named() {
         let mut found = finding(vec!["command_delay"], 5e5, 1.5);
         let arm = found.left[0];
-        found.left.push(Left { of_object: true, before: 301.0, after: 91.0, ..arm });
+        found.left.push(SensorGap { sensors: Sensors::Object, before: 301.0, after: 91.0, ..arm });
         assert_eq!(found.decide().kind, Kind::Named);
         assert_eq!(Finding { of_arm: false, ..found.clone() }.decide().kind, Kind::Unexplained);
         let mut little = found.clone();

@@ -1,9 +1,9 @@
 //! How much of the gap a fit closes when nothing of a clip's own is fitted.
 
 use super::gap::{Residuals, Typical};
-use super::remainder::Left;
 use super::trial::MIN_SHARE_CLOSED;
 
+use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use inference::admit::Split;
 use inference::likelihood::{Evidence, Group};
@@ -22,7 +22,7 @@ pub fn closes<E: Evidence>(
     let on = |clips: &[usize]| -> Option<Vec<f64>> {
         let [before, after] = hypotheses.map(|hypothesis| Residuals::at(bench, hypothesis, clips));
         let (before, after) = (before?, after?);
-        let left = Left::of_groups(&before.typical(), &after.typical());
+        let left = SensorGap::of_groups(&before.typical(), &after.typical());
         let shares = left.iter().zip(whole).map(|(left, whole)| share(left, whole.mean_square));
         let in_contact = before.typical_of(Group::Contact).zip(after.typical_of(Group::Contact));
         let contact = in_contact.map(|(before, after)| way(before.mean_square, after.mean_square, before.floor));
@@ -40,10 +40,10 @@ fn way(before: f64, after: f64, floor: f64) -> f64 {
 
 /// The same of what is left of a gap. A real arm's gap lies so far above the noise that nobody comes down to it: there the plain
 /// share of the baseline's gap counts, where that is more.
-fn share(left: &Left, whole: f64) -> f64 {
+fn share(left: &SensorGap, whole: f64) -> f64 {
     let way = way(left.before, left.after, left.floor);
     let beyond_numerics = left.before - left.floor > left.numerics();
-    if way > 0.0 && beyond_numerics && !left.of_object {
+    if way > 0.0 && beyond_numerics && !left.of_object() {
         way.max((left.before - left.after) / (whole - left.floor))
     } else {
         way
@@ -53,10 +53,11 @@ fn share(left: &Left, whole: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::answer::diagnosis::Sensors;
 
     #[test]
     fn far_above_the_noise_the_plain_share_of_the_whole_gap_counts() {
-        let left = |before, after| Left { before, after, floor: 1.0, of_object: false };
+        let left = |before, after| SensorGap { sensors: Sensors::Joints, before, after, floor: 1.0 };
         assert!((share(&left(1e5, 2e4), 1e5) - 0.8).abs() < 1e-3, "four fifths, and 14 % of the way");
         // A fifth of what a first effect left, itself a hundredth: of the whole next to nothing.
         assert!(share(&left(1e3, 8e2), 1e5) < 0.05);

@@ -6,9 +6,10 @@
 
 use super::gap::{Residuals, Shrunk};
 use super::held_out::Fits;
-use super::remainder::{self, Left};
+use super::remainder;
 use super::score::predict_unseen;
 use super::trial::MIN_SHARE_CLOSED;
+use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::select::gain::Gain;
 use crate::diagnose::work::DiagnoseError;
@@ -75,7 +76,7 @@ fn mean([before, after]: [&Residuals; 2]) -> f64 {
 
 /// The share that is explained of what is not noise in a clip like most, in the group of sensors of which that is most.
 fn usual(before: &Residuals, after: &Residuals) -> f64 {
-    Left::of_groups(&before.typical(), &after.typical()).iter().map(Left::explained).fold(0.0, f64::max)
+    SensorGap::of_groups(&before.typical(), &after.typical()).iter().map(SensorGap::explained).fold(0.0, f64::max)
 }
 
 /// The same of the joints in contact; 0 where no tool touches anything.

@@ -13,12 +13,30 @@ use rayon::prelude::*;
 pub struct Residuals {
     /// Clip and residuals.
     pub clips: Vec<(usize, Vec<f64>)>,
-    /// For each clip and group of sensors (arm, object, arm in contact) the sum of squares and the number of residuals.
-    sums: Vec<Vec<(f64, f64)>>,
+    sums: Vec<Sums>,
     /// The same of every piece of a clip: whole clips where there are enough of them.
-    pieces: Vec<Vec<(f64, f64)>>,
+    pieces: Vec<Sums>,
     /// The same of what noise and the scatter between clips alone would leave.
-    floors: Vec<Vec<(f64, f64)>>,
+    floors: Vec<Sums>,
+}
+
+/// Squared residuals of a clip or a part of one, by groups of sensors.
+type Sums = [Sum; 3];
+
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Sum {
+    squares: f64,
+    rows: f64,
+}
+
+impl Sum {
+    fn with(self, other: Self) -> Self {
+        Self { squares: self.squares + other.squares, rows: self.rows + other.rows }
+    }
+
+    fn mean(self) -> Option<f64> {
+        (self.rows > 0.0).then(|| self.squares / self.rows)
+    }
 }
 
 /// How far the gap shrinks on held-out clips.
@@ -26,7 +44,7 @@ pub struct Residuals {
 pub struct Shrunk {
     /// Of the mean squared residual, see [`Residuals::shrink`].
     pub mean: f64,
-    /// Of what is not noise in a clip like most, see [`super::remainder::Left::explained`].
+    /// Of what is not noise in a clip like most, see [`crate::answer::diagnosis::SensorGap::explained`].
     pub usual: f64,
     /// The same of the joints in contact; 0 where no tool touches anything.
     pub contact: f64,
@@ -49,15 +67,6 @@ pub struct Typical {
 /// to a push says how the object resists.
 const WITH_A_GAP: [Group; 2] = [Group::Arm, Group::Object];
 
-/// Place of a group's sums.
-fn place(group: Group) -> usize {
-    match group {
-        Group::Arm => 0,
-        Group::Object => 1,
-        Group::Contact => 2,
-    }
-}
-
 impl Residuals {
     /// Of clips at the numbers of a hypothesis.
     pub fn at<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, clips: &[usize]) -> Option<Self> {
@@ -78,17 +87,17 @@ impl Residuals {
             Some((*clip, out))
         };
         let clips: Vec<(usize, Vec<f64>)> = clips.par_iter().map(one).collect::<Option<_>>()?;
-        let cut = MIN_PIECES.div_ceil(clips.len().max(1));
-        let in_pieces = |(clip, residuals): &(usize, Vec<f64>)| pieces(bench.evidence, *clip, residuals, cut);
-        let pieces = clips.iter().flat_map(in_pieces).collect();
-        let sums = clips.iter().map(|(clip, residuals)| sums(bench.evidence, *clip, residuals)).collect();
+        let in_pieces = |cut: usize| {
+            clips.iter().flat_map(move |(clip, residuals)| pieces(bench.evidence, *clip, residuals, cut)).collect()
+        };
+        let (sums, pieces) = (in_pieces(1), in_pieces(MIN_PIECES.div_ceil(clips.len().max(1))));
         let floors = clips.iter().map(|(clip, _)| sums_of_noise(bench, *clip)).collect();
         Some(Self { clips, sums, pieces, floors })
     }
 
     /// What noise and the scatter between clips alone would leave of [`Self::mean_square`].
     pub fn floor(&self) -> f64 {
-        mean(&self.floors, &(0..self.clips.len()).collect::<Vec<_>>())
+        mean(&self.floors)
     }
 
     /// Of every group of sensors, the geometric mean over clips of their mean squares: one stroke that went its own way
@@ -99,9 +108,8 @@ impl Residuals {
 
     /// The same of one group; `None` where no clip has any of it.
     pub fn typical_of(&self, group: Group) -> Option<Typical> {
-        let usual = |sums: &[Vec<(f64, f64)>]| {
-            let of_group = sums.iter().filter_map(|clip| clip.get(place(group)));
-            let values: Vec<f64> = of_group.filter(|(_, count)| *count > 0.0).map(|(sum, count)| sum / count).collect();
+        let usual = |sums: &[Sums]| {
+            let values: Vec<f64> = sums.iter().filter_map(|clip| clip[group as usize].mean()).collect();
             let logarithms = values.iter().map(|value| value.max(f64::MIN_POSITIVE).ln());
             (!values.is_empty()).then(|| (logarithms.sum::<f64>() / values.len() as f64).exp())
         };
@@ -111,12 +119,12 @@ impl Residuals {
 
     /// Mean square: the mean over the groups of sensors, so that a thousand encoder rows do not drown the object.
     pub fn mean_square(&self) -> f64 {
-        mean(&self.sums, &(0..self.clips.len()).collect::<Vec<_>>())
+        mean(&self.sums)
     }
 
     /// In how many clips the mean square is smaller than `before`, and how many clips there are.
     pub fn clips_that_shrink(&self, before: &Self) -> [usize; 2] {
-        let falls = |clip: &usize| mean(&self.sums, &[*clip]) < mean(&before.sums, &[*clip]);
+        let falls = |clip: &usize| mean([&self.sums[*clip]]) < mean([&before.sums[*clip]]);
         [(0..self.clips.len()).filter(falls).count(), self.clips.len()]
     }
 
@@ -130,7 +138,8 @@ impl Residuals {
     /// the shrink of the whole. At least [`SHRINK_OF_A_DOUBLED_GAP`].
     pub fn shrink_added(&self, from: &Self, before: &Self, seed: u64) -> Share {
         let of = |drawn: &[usize]| {
-            let [from, after, before] = [from, self, before].map(|residuals| mean(&residuals.pieces, drawn));
+            let [from, after, before] =
+                [from, self, before].map(|residuals| mean(drawn.iter().map(|k| &residuals.pieces[*k])));
             ((from - after) / before.max(f64::MIN_POSITIVE)).max(SHRINK_OF_A_DOUBLED_GAP)
         };
         let all: Vec<usize> = (0..self.pieces.len()).collect();
@@ -157,46 +166,37 @@ const BOOTSTRAP_DRAWS: usize = 1000;
 /// It draws from at least so many pieces (a choice): from fewer an interval is far too narrow.
 const MIN_PIECES: usize = 8;
 
-fn sums(evidence: &impl Evidence, clip: usize, residuals: &[f64]) -> Vec<(f64, f64)> {
-    pieces(evidence, clip, residuals, 1).swap_remove(0)
-}
-
 /// Sums of a clip cut into so many pieces of the same duration.
-fn pieces(evidence: &impl Evidence, clip: usize, residuals: &[f64], cut: usize) -> Vec<Vec<(f64, f64)>> {
+fn pieces(evidence: &impl Evidence, clip: usize, residuals: &[f64], cut: usize) -> Vec<Sums> {
     let rows = evidence.rows(clip);
     let last = rows.iter().map(|row| row.time).fold(f64::MIN_POSITIVE, f64::max);
-    let mut pieces = vec![vec![(0.0, 0.0); 3]; cut];
+    let mut pieces = vec![Sums::default(); cut];
     for (row, residual) in rows.iter().zip(residuals) {
         let piece = ((row.time / last * cut as f64) as usize).min(cut - 1);
-        let group = &mut pieces[piece][place(evidence.channels()[row.channel].group)];
-        *group = (group.0 + residual * residual, group.1 + 1.0);
+        let group = &mut pieces[piece][evidence.channels()[row.channel].group as usize];
+        *group = group.with(Sum { squares: residual * residual, rows: 1.0 });
     }
     pieces
 }
 
 /// The sums that noise of one sigma and nuisance parameters that scatter as assumed would give.
-fn sums_of_noise<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Vec<(f64, f64)> {
+fn sums_of_noise<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Sums {
     let rows = bench.evidence.rows(clip);
     let mut squares = vec![1.0; rows.len()];
     for (k, random) in bench.scatter.random.iter().enumerate() {
         let slopes = bench.evidence.own_slope(clip, k).unwrap_or_default();
         squares.iter_mut().zip(slopes).for_each(|(square, slope)| *square += (slope * random.sigma).powi(2));
     }
-    sums(bench.evidence, clip, &squares.into_iter().map(f64::sqrt).collect::<Vec<_>>())
+    let sigmas: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
+    pieces(bench.evidence, clip, &sigmas, 1)[0]
 }
 
-fn group_means(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> Vec<f64> {
-    let of = |group: Group| {
-        let of_clip = |k: &usize| sums[*k][place(group)];
-        let add = |(sum, count): (f64, f64), (more, rows): (f64, f64)| (sum + more, count + rows);
-        let (sum, count) = drawn.iter().map(of_clip).fold((0.0, 0.0), add);
-        (count > 0.0).then(|| sum / count)
-    };
-    WITH_A_GAP.into_iter().filter_map(of).collect()
-}
-
-fn mean(sums: &[Vec<(f64, f64)>], drawn: &[usize]) -> f64 {
-    let means = group_means(sums, drawn);
+/// The mean over the groups that have a gap.
+fn mean<'a>(parts: impl IntoIterator<Item = &'a Sums>) -> f64 {
+    let total = parts
+        .into_iter()
+        .fold(Sums::default(), |total, part| [0, 1, 2].map(|group: usize| total[group].with(part[group])));
+    let means: Vec<f64> = WITH_A_GAP.into_iter().filter_map(|group| total[group as usize].mean()).collect();
     means.iter().sum::<f64>() / means.len().max(1) as f64
 }
 
@@ -211,7 +211,7 @@ mod tests {
 
     fn residuals(sizes: &[f64]) -> Residuals {
         let clips = sizes.iter().enumerate().map(|(clip, size)| (clip, vec![*size; 10])).collect();
-        let sums = |size: &f64| vec![(10.0 * size * size, 10.0), (0.0, 0.0), (0.0, 0.0)];
+        let sums = |size: &f64| [Sum { squares: 10.0 * size * size, rows: 10.0 }, Sum::default(), Sum::default()];
         let floors = sizes.iter().map(|_| sums(&1.0)).collect();
         let sums: Vec<_> = sizes.iter().map(sums).collect();
         Residuals { clips, pieces: sums.clone(), sums, floors }

@@ -8,66 +8,48 @@ use super::gap::Typical;
 use crate::answer::diagnosis::{SensorGap, Sensors};
 use crate::diagnose::criteria::{
     DOUBTFUL_EXCESS, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, MOST_OF_IT, OBJECT_EXCESS,
-    OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, TURNS_WITHIN, plain_excess,
+    OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, PLAIN_EXCESS, TURNS_WITHIN,
 };
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use inference::likelihood::Evidence;
 use twin::effects::Role;
 
-/// The gap in squared sigmas on clips that were not fitted.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Left {
-    /// Of the baseline.
-    pub before: f64,
-    /// Of the hypothesis.
-    pub after: f64,
-    /// What noise alone would leave.
-    pub floor: f64,
-    /// Whether it is the object's.
-    pub of_object: bool,
-}
-
-impl Left {
+impl SensorGap {
     /// Of every group of sensors, in a clip like most.
     pub fn of_groups(before: &[Typical], after: &[Typical]) -> Vec<Self> {
         let one = |(before, after): (&Typical, &Typical)| Self {
+            sensors: if before.of_object { Sensors::Object } else { Sensors::Joints },
             before: before.mean_square,
             after: after.mean_square,
             floor: before.floor,
-            of_object: before.of_object,
         };
         before.iter().zip(after).map(one).collect()
     }
 
-    /// For diagnosis.json, of every group of sensors.
-    pub fn of_all_sensors(before: &[Typical], after: &[Typical]) -> Vec<SensorGap> {
-        Self::of_groups(before, after).iter().map(Self::of_sensors).collect()
-    }
-
-    fn of_sensors(&self) -> SensorGap {
-        let sensors = if self.of_object { Sensors::Object } else { Sensors::Joints };
-        SensorGap { sensors, before: self.before, after: self.after, floor: self.floor }
+    pub fn of_object(&self) -> bool {
+        self.sensors == Sensors::Object
     }
 
     /// What other reasons than a cause leave beyond the noise.
     pub fn numerics(&self) -> f64 {
-        if self.of_object { OBJECT_EXCESS_BESIDE_A_CAUSE.value } else { JOINTS_EXCESS_BESIDE_A_CAUSE.value }
+        if self.of_object() { OBJECT_EXCESS_BESIDE_A_CAUSE.value } else { JOINTS_EXCESS_BESIDE_A_CAUSE.value }
     }
 
     /// Share of the gap that a cause may leave.
     pub fn substitute(&self) -> f64 {
-        if self.of_object { OBJECT_SHARE_LEFT.value } else { JOINTS_SHARE_LEFT.value }
+        if self.of_object() { OBJECT_SHARE_LEFT.value } else { JOINTS_SHARE_LEFT.value }
     }
 
     /// The gap of the twin without any effect beyond the noise, in least gaps: of 1 on it is a gap.
     pub fn gaps(&self) -> f64 {
-        (self.before - self.floor) / if self.of_object { OBJECT_EXCESS.value } else { JOINTS_EXCESS.value }
+        (self.before - self.floor) / if self.of_object() { OBJECT_EXCESS.value } else { JOINTS_EXCESS.value }
     }
 
     /// Whether the gap of the twin without any effect is so large that a substitute for its cause does not close it.
     pub fn is_plain(&self) -> bool {
-        self.before - self.floor > plain_excess(self.of_object)
+        let least = if self.of_object() { OBJECT_EXCESS } else { JOINTS_EXCESS_BESIDE_A_CAUSE };
+        self.before - self.floor > PLAIN_EXCESS * least.value
     }
 
     /// How likely it is that nothing is there where no cause is seen.
@@ -80,7 +62,7 @@ impl Left {
     pub fn too_much(&self, clear: bool) -> bool {
         let excess = self.after - self.floor;
         // After a bouncing hit no two engines agree; what unknown causes are mistaken for leaves two thirds.
-        let substitute = if clear && self.of_object { MOST_OF_IT } else { self.substitute() };
+        let substitute = if clear && self.of_object() { MOST_OF_IT } else { self.substitute() };
         excess > self.numerics() && excess > substitute * (self.before - self.floor)
     }
 
@@ -128,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_gap_that_closes_to_a_hundredth_is_explained_and_one_that_halves_is_not() {
-        let left = |after| Left { before: 1000.0, after, floor: 1.0, of_object: false };
+        let left = |after| SensorGap { sensors: Sensors::Joints, before: 1000.0, after, floor: 1.0 };
         assert!(!left(12.0).too_much(false));
         assert!(left(500.0).too_much(false));
         assert!((left(500.0).explained() - 0.5005).abs() < 1e-3);
@@ -136,14 +118,14 @@ mod tests {
 
     #[test]
     fn a_clear_cause_may_leave_a_rough_hit_rough_and_an_arm_nothing() {
-        let of_object = Left { before: 60.0, after: 26.0, floor: 1.5, of_object: true };
+        let of_object = SensorGap { sensors: Sensors::Object, before: 60.0, after: 26.0, floor: 1.5 };
         assert!(of_object.too_much(false) && !of_object.too_much(true));
-        assert!(Left { after: 40.0, ..of_object }.too_much(true), "two thirds are left");
-        assert!(Left { of_object: false, ..of_object }.too_much(true));
+        assert!(SensorGap { after: 40.0, ..of_object }.too_much(true), "two thirds are left");
+        assert!(SensorGap { sensors: Sensors::Joints, ..of_object }.too_much(true));
     }
 
     #[test]
     fn what_numerics_leave_is_no_remainder() {
-        assert!(!Left { before: 2.0, after: 2.0, floor: 1.0, of_object: false }.too_much(false));
+        assert!(!SensorGap { sensors: Sensors::Joints, before: 2.0, after: 2.0, floor: 1.0 }.too_much(false));
     }
 }

@@ -57,11 +57,7 @@ impl Sizes {
     }
 
     /// With the gap in sigmas: what two hypotheses leave.
-    pub(in crate::diagnose) fn gap(
-        self,
-        ([before, shown], sensors): ([&Residuals; 2], Vec<SensorGap>),
-        seed: u64,
-    ) -> Gap {
+    pub(in crate::diagnose) fn gap(self, [before, shown]: [&Residuals; 2], sensors: Vec<SensorGap>, seed: u64) -> Gap {
         Gap {
             unit: "sigma",
             before: before.mean_square(),

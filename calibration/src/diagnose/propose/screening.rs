@@ -1,10 +1,10 @@
 //! Which candidates are worth a fit.
 
+use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::criteria::{MOST_OF_IT, OBJECT_EXCESS};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
 use crate::diagnose::judge::gap::Typical;
-use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::trial::Step;
 use crate::diagnose::select::criteria::EFFECTS;
 use inference::likelihood::Evidence;
@@ -74,7 +74,7 @@ pub(in crate::diagnose) fn to_fit<E: Evidence>(
 
 /// Whether the arm's gap is larger than numerics beside an object.
 pub(in crate::diagnose) fn arm_gap_is_open(whole: &[Typical], left: &[Typical]) -> bool {
-    left.len() > 1 && Left::of_groups(whole, left).iter().any(|left| !left.of_object && left.too_much(false))
+    left.len() > 1 && SensorGap::of_groups(whole, left).iter().any(|left| !left.of_object() && left.too_much(false))
 }
 
 /// The object's candidates that stand out once clips are held to the least scatter, whatever else the score test says.
@@ -99,7 +99,7 @@ pub(in crate::diagnose) fn seen_at_the_least_scatter<'a, E: Evidence>(
 /// fitted in any case.
 pub(in crate::diagnose) fn overlooked<E: Evidence>(bench: &Bench<'_, E>, step: &Step) -> Vec<usize> {
     let arm = step.left.iter().find(|group| !group.of_object);
-    if !arm.is_some_and(|arm| Left::of_groups(&[*arm], &[*arm])[0].too_much(false)) {
+    if !arm.is_some_and(|arm| SensorGap::of_groups(&[*arm], &[*arm])[0].too_much(false)) {
         return Vec::new();
     }
     let rest = step.trials.iter().filter(|trial| trial.fitted.is_none() && trial.scored.signal > TESTABLE);

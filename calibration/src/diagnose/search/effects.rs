@@ -6,6 +6,7 @@
 
 use super::again::{by_engine, found_by_engine, reconsidered, rivals_refitted, without_the_best};
 use super::refit::{fewer, last_pass, refitted};
+use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
 use crate::diagnose::fit::anchored::Anchored;
 use crate::diagnose::fit::bench::Hypothesis;
@@ -13,7 +14,6 @@ use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT, SCREENING};
 use crate::diagnose::fit::shortlist::MAX_FORMS;
 use crate::diagnose::fit::{floor, stages, undetermined};
 use crate::diagnose::judge::gap::Residuals;
-use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::score::predict;
 use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::propose::screening::{arm_gap_is_open, overlooked, seen_at_the_least_scatter, to_fit};
@@ -119,7 +119,7 @@ fn is_spent<E: Evidence>(search: &Search<'_, E>, first: &Step, now: &Hypothesis)
     let typical =
         |hypothesis| Residuals::at(search.bench, hypothesis, search.split.elsewhere()).map(|left| left.typical());
     let (Some(before), Some(after)) = (typical(&first.from), typical(now)) else { return false };
-    Left::of_groups(&before, &after).iter().all(|left| {
+    SensorGap::of_groups(&before, &after).iter().all(|left| {
         left.after - left.floor <= JOINTS_EXCESS_BESIDE_A_CAUSE.value.max(NUMERICS_OF_GAP * (left.before - left.floor))
     })
 }
