@@ -12,8 +12,6 @@ use shared_mem::time::seconds_between;
 
 /// Points of a picture's line (a choice: one in two pixels).
 const POINTS_OF_A_LINE: usize = 400;
-/// A clip whose error is so many times the usual one is odd: a clock that jumped, a hand on the arm.
-const TIMES_THE_USUAL_ERROR: f64 = 5.0;
 
 /// Measured less predicted positions at the rows that count.
 struct Errors {
@@ -44,7 +42,7 @@ pub(super) fn fill(
 }
 
 fn odd_clips(clips: &[ClipGap]) -> Vec<String> {
-    let all = odd(clips, |clip| clip.after.joint_rms_rad.unwrap_or(0.0), TIMES_THE_USUAL_ERROR, 0.0);
+    let all = odd(clips, |clip| clip.after.joint_rms_rad.unwrap_or(0.0), 0.0);
     let all = all.into_iter();
     all.map(|Odd { clip, error, usual }| {
         format!(

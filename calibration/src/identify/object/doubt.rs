@@ -7,8 +7,6 @@ use shared_mem::cell::Cell;
 
 /// ADD on the clips fitted, over the tracker's noise, from which on it is neither noise nor chance in the hits (a choice).
 const BEYOND_NOISE: f64 = 7.0;
-/// A clip is none of the others' kind when its ADD is this many times the middle clip's.
-const TIMES_THE_USUAL_ERROR: f64 = 4.0;
 
 /// Doubts about a fit whose figures stand in `answer`.
 pub(super) fn doubts(answer: &Identification, cell: &Cell) -> Vec<String> {
@@ -31,7 +29,7 @@ pub(super) fn doubts(answer: &Identification, cell: &Cell) -> Vec<String> {
         ));
     }
     let add = |clip: &ClipGap| clip.after.object_add_m.unwrap_or_default();
-    for Odd { clip, error, usual } in odd(&answer.by_clip, add, TIMES_THE_USUAL_ERROR, BEYOND_NOISE * noise) {
+    for Odd { clip, error, usual } in odd(&answer.by_clip, add, BEYOND_NOISE * noise) {
         doubts.push(format!(
             "{}: the object is {:.1} mm off where it is {:.1} mm in the middle clip: look whether it was hit on an edge, pushed by \
              something else or lost, and leave the clip out if so",
