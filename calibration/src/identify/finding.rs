@@ -8,6 +8,8 @@ use inference::likelihood::Setting;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
+/// A gain, friction or a mass is not identifiable where its 95 % interval, to either side, is wider than this share of it (a choice).
+pub(super) const OPEN_FROM_SHARE_OF_VALUE: f64 = 0.25;
 /// Correlation of two estimates from which on they are said to move together (a choice).
 const MOVE_TOGETHER: f64 = 0.9;
 /// Recordings that are proposed (a choice).

@@ -2,15 +2,13 @@
 
 use super::Model;
 use crate::answer::identification::{Advice, NotIdentifiable};
-use crate::identify::finding::Finding;
+use crate::identify::finding::{Finding, OPEN_FROM_SHARE_OF_VALUE};
 use crate::identify::run::Optimizer;
 use crate::identify::used::Used;
 use inference::likelihood::Setting;
 use inference::statistics::extent;
 use twin::effects::{Robot, find};
 
-/// A gain whose 95 % interval is wider than this share of it, to either side, is not identifiable (a choice).
-const GAIN_OPEN_FROM: f64 = 0.25;
 /// A parameter of an effect whose interval is wider than this share of the plausible range is not identifiable (a choice).
 const EFFECT_OPEN_FROM: f64 = 0.5;
 /// An interval is judged by its share of a number, or of this share of its search where the number is nearly 0 (a choice).
@@ -55,7 +53,7 @@ fn why(finding: &Finding<'_>, k: usize, model: &Model<'_>, clips: &Used) -> Opti
         return Some("not identifiable apart from other numbers: only a combination of them shows".into());
     }
     let (size, share) = match setting {
-        Setting::Stiffness(_) | Setting::Damping(_) => (finding.fit.shared[k].abs(), GAIN_OPEN_FROM),
+        Setting::Stiffness(_) | Setting::Damping(_) => (finding.fit.shared[k].abs(), OPEN_FROM_SHARE_OF_VALUE),
         _ => (met_width(model, setting).unwrap_or(unknown.upper - unknown.lower), EFFECT_OPEN_FROM),
     };
     if half <= share * size {

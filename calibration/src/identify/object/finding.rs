@@ -3,14 +3,12 @@
 use super::Problem;
 use super::material::Material;
 use crate::answer::identification::Identification;
-use crate::identify::finding::Finding;
+use crate::identify::finding::{Finding, OPEN_FROM_SHARE_OF_VALUE};
 use inference::likelihood::Setting;
 use inference::object_fit::ObjectFit;
 
-/// A number is not identifiable where half its interval is more than this share of its range (a choice),
+/// A number is not identifiable where half its interval is more than this share of its range (a choice).
 const OPEN_FROM_SHARE_OF_RANGE: f64 = 0.25;
-/// nor are friction and mass where it is more than this share of the value (a choice).
-const OPEN_FROM_SHARE_OF_VALUE: f64 = 0.3;
 /// Weight of a clip below which it is said (a choice).
 const FULL_WEIGHT: f64 = 0.99;
 
