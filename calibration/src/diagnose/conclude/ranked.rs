@@ -7,7 +7,7 @@ use super::measure::Measures;
 use super::reason::{Judged, reason};
 use crate::answer::diagnosis::{Candidate, Share, Status};
 use crate::diagnose::Kind;
-use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::shortlist::TESTABLE;
 use crate::diagnose::fit::{parameters, time_step};
 use crate::diagnose::judge::gap::{Residuals, SHRINK_OF_A_DOUBLED_GAP};
@@ -16,8 +16,6 @@ use crate::diagnose::judge::{confidence, held_out};
 use crate::diagnose::propose::screening;
 use inference::likelihood::Evidence;
 
-/// What nobody fitted closes nothing.
-const NOT_FITTED: Share = Share { value: 0.0, ci90: [0.0; 2] };
 /// Of numbers with which the twin has no answer in the clips kept for confirming.
 const NO_ANSWER: Share = Share { value: SHRINK_OF_A_DOUBLED_GAP, ci90: [SHRINK_OF_A_DOUBLED_GAP; 2] };
 
@@ -29,35 +27,70 @@ pub(super) fn candidates<E: Evidence>(
     kind: Kind,
 ) -> Vec<Candidate> {
     let Case { bench, split, .. } = *case;
-    let (found, finding, seed) = (decided.found(case), &decided.finding, case.options.seed);
-    let (before, after) = (&measures.without.left, decided.after(measures));
+    let (found, before) = (decided.found(case), &measures.without.left);
     let first = &found.steps[0];
     let last = found.steps.last().filter(|_| !found.last.effects.is_empty());
-    let time_step = last.and_then(|last| time_step::error(bench, &found.last, &last.weights)).unwrap_or_default();
-    let believed = matches!(kind, Kind::Named | Kind::Class);
-    let likely = confidence::probabilities(&first.trials, found.last.effects.is_empty());
-    let on_confirm = |fit: &Hypothesis, step: &Step| held_out::residuals(bench, split, fit, &step.weights);
-    // What every step left on the confirm clips: the baseline is known, and others are what their candidates are measured from.
-    let left: Vec<Option<Residuals>> = (found.steps.iter())
-        .map(|step| if step.from.effects.is_empty() { Some(before.clone()) } else { on_confirm(&step.from, step) })
-        .collect();
-    let one = |trial: &Trial| {
+    let on_confirm = |step: &Step| held_out::residuals(bench, split, &step.from, &step.weights);
+    let of_step = |step: &Step| if step.from.effects.is_empty() { Some(before.clone()) } else { on_confirm(step) };
+    let drawn_from = DrawnFrom {
+        case,
+        measures,
+        decided,
+        kind,
+        found,
+        believed: matches!(kind, Kind::Named | Kind::Class),
+        likely: confidence::probabilities(&first.trials, found.last.effects.is_empty()),
+        time_step: last.and_then(|last| time_step::error(bench, &found.last, &last.weights)).unwrap_or_default(),
+        left: found.steps.iter().map(of_step).collect(),
+    };
+    let mut all: Vec<Candidate> = first.trials.iter().map(|trial| drawn_from.said_of(trial)).collect();
+    all.sort_by(|a, b| {
+        let key = |c: &Candidate| (c.status != Status::Named, c.status != Status::Possible, -c.probability);
+        key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
+    });
+    all
+}
+
+/// What is said of a candidate is drawn from this.
+struct DrawnFrom<'a, E> {
+    case: &'a Case<'a, E>,
+    measures: &'a Measures,
+    decided: &'a Decided<'a>,
+    kind: Kind,
+    found: &'a Found,
+    believed: bool,
+    /// How likely each candidate is.
+    likely: Vec<(usize, f64)>,
+    /// How far the twin's time step moves the numbers of the last hypothesis.
+    time_step: Vec<f64>,
+    /// What every step left on the confirm clips: the baseline is known, and others are what their candidates are measured from.
+    left: Vec<Option<Residuals>>,
+}
+
+impl<E: Evidence> DrawnFrom<'_, E> {
+    /// `trial`: that of the first step.
+    fn said_of(&self, trial: &Trial) -> Candidate {
+        let Self { case, measures, found, kind, .. } = *self;
+        let (bench, finding) = (case.bench, &self.decided.finding);
+        let (before, after) = (&measures.without.left, self.decided.after(measures));
         let effect = trial.scored.candidate;
-        let name = bench.library.candidates[effect].effect.name;
-        let kept = believed && found.last.effects.contains(&effect);
-        let place = judged_in(found, effect, believed);
+        let name = case.name(effect);
+        let kept = self.believed && found.last.effects.contains(&effect);
+        let place = judged_in(found, effect, self.believed);
         let step = &found.steps[place];
         let trial = step.trial(effect).unwrap_or(trial);
         let with = match &trial.fitted {
-            _ if kept => after_keeping(found, &left, after, place),
-            Some((fit, _)) => held_out::estimated(bench, split, fit, &step.weights),
+            _ if kept => after_keeping(found, &self.left, after, place),
+            Some((fit, _)) => held_out::estimated(bench, case.split, fit, &step.weights),
             None => None,
         };
-        let closed = with.as_ref().zip(left[place].as_ref()).map(|(with, from)| with.shrink_added(from, before, seed));
-        let shrink = closed.unwrap_or(if trial.fitted.is_some() { NO_ANSWER } else { NOT_FITTED });
-        let beside: Vec<&str> = step.from.effects.iter().map(|k| bench.library.candidates[*k].effect.name).collect();
+        let closed = with.as_ref().zip(self.left[place].as_ref());
+        let shrink = closed.map(|(with, from)| with.shrink_added(from, before, case.options.seed));
+        let shrink = shrink.unwrap_or(if trial.fitted.is_some() { NO_ANSWER } else { Share::default() });
+        let beside: Vec<&str> = step.from.effects.iter().map(|effect| case.name(*effect)).collect();
         let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
-        let probability = likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
+        let time_step = if kept { &self.time_step[..] } else { &[] };
+        let probability = self.likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
         let hidden = is_hidden_by_the_arm(bench, step, trial);
         let status = match kind {
             Kind::Named if kept => Status::Named,
@@ -71,20 +104,14 @@ pub(super) fn candidates<E: Evidence>(
             effect: name.into(),
             probability: if kept { probability.max(finding.confidence) } else { probability },
             parameters: fit
-                .map(|fit| parameters::of_effect_moved(bench, fit, effect, if kept { &time_step } else { &[] }))
+                .map(|fit| parameters::of_effect_moved(bench, fit, effect, time_step))
                 .unwrap_or_default(),
             shrink,
-            confusable_with: confusable(first, effect, measures.overdispersion[0], bench),
+            confusable_with: confusable(case, &found.steps[0], effect, measures.overdispersion[0]),
             status,
             why: format!("{}{}", reason(bench, found, &judged), carried_over(&shrink)),
         }
-    };
-    let mut all: Vec<Candidate> = first.trials.iter().map(one).collect();
-    all.sort_by(|a, b| {
-        let key = |c: &Candidate| (c.status != Status::Named, c.status != Status::Possible, -c.probability);
-        key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
-    });
-    all
+    }
 }
 
 /// What the hypothesis left once the effect that was added in the step at `place` was in it: what the next step began with,
@@ -120,9 +147,9 @@ fn judged_in(found: &Found, effect: usize, believed: bool) -> usize {
         .unwrap_or(0)
 }
 
-fn confusable<E: Evidence>(first: &Step, effect: usize, overdispersion: f64, bench: &Bench<'_, E>) -> Vec<String> {
-    let near = confidence::rivals(first, bench.library, effect, overdispersion);
-    near.iter().map(|other| bench.library.candidates[*other].effect.name.to_owned()).collect()
+fn confusable<E: Evidence>(case: &Case<'_, E>, first: &Step, effect: usize, overdispersion: f64) -> Vec<String> {
+    let near = confidence::rivals(first, case.bench.library, effect, overdispersion);
+    near.iter().map(|other| case.name(*other).to_owned()).collect()
 }
 
 /// What is added to the reason where numbers that fit some clips are wrong in the others.

@@ -98,7 +98,7 @@ fn identify_kept(
     let clips = session::used(&options.session, &model, left_out, unusable, options.seed)?;
     let before: Vec<f64> = unknowns.iter().map(|unknown| unknown.start).collect();
     let train = &clips.split.train;
-    begin(&cell, (&mut model, train), settings.settings(), &mut unknowns, work);
+    begin(&cell, &mut model, train, settings.settings(), &mut unknowns, work);
     let random = model.random();
     let run = Run { unknowns: &unknowns, random: &random, options, work };
     // A rough fit to a third of the clips brings the rest near for a third of the price.
@@ -125,7 +125,8 @@ fn identify_kept(
 /// reads as if it stood still: it follows its command unseen from then on, and its gains are free again.
 fn begin(
     cell: &Cell,
-    (model, train): (&mut Model<'_>, &[usize]),
+    model: &mut Model<'_>,
+    train: &[usize],
     settings: &[Setting],
     unknowns: &mut [Unknown],
     Work { kept, interrupt }: Work<'_>,

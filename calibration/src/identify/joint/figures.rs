@@ -7,6 +7,7 @@ use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Clips, Figures, Gap, Identification, NotIdentifiable, Parameter};
 use crate::identify::figures::USE_FITTED;
 use crate::identify::finding::rows;
+use crate::identify::run::Optimizer;
 use inference::admit::remarks::grouped;
 use inference::estimate::ClipFit;
 use std::collections::BTreeMap;
@@ -24,57 +25,33 @@ pub(super) fn answer(
     before: &[ClipFit],
     held_out: Option<&[ClipFit]>,
 ) -> Identification {
-    let slides = material.subject.joint.slides;
-    let rms = |fits: &[ClipFit], motions: &[Motion]| {
-        let rows: usize = fits.iter().map(|fit| fit.rows).sum();
-        let sum: f64 = fits.iter().zip(motions).map(|(fit, motion)| fit.chi2 * motion.sigma.powi(2)).sum();
-        figures(slides, (sum / rows.max(1) as f64).sqrt())
-    };
-    let [old, new] = [before, &found.fit.clips].map(|fits| rms(fits, motions));
+    let subject = &material.subject;
+    let rms = |fits: &[ClipFit]| rms(subject.joint.slides, fits, motions);
+    let (old, new) = (rms(before), rms(&found.fit.clips));
     let gap = Gap {
         train: new,
         train_before: old,
-        holdout: held_out.map_or_else(Figures::default, |fits| rms(fits, motions)),
-        holdout_before: held_out.map_or_else(Figures::default, |_| old),
+        holdout: held_out.map(rms).unwrap_or_default(),
+        holdout_before: held_out.map(|_| old).unwrap_or_default(),
     };
-    let used = || material.looked.iter().filter(|looked| !looked.motions.is_empty());
-    let files: Vec<String> = used().map(|looked| looked.file.clone()).collect();
-    let mut first = 0;
-    let mut by_clip = Vec::new();
-    for looked in used() {
-        let own = first..first + looked.motions.len();
-        first = own.end;
-        let after =
-            rms(held_out.unwrap_or(&found.fit.clips).get(own.clone()).unwrap_or_default(), &motions[own.clone()]);
-        by_clip.push(ClipGap {
-            file: looked.file.clone(),
-            used: if held_out.is_some() { "held out in turn".into() } else { USE_FITTED.into() },
-            joint_rms_rad: after.joint_rms_rad.into_iter().collect(),
-            after,
-            before: rms(&before[own.clone()], &motions[own]),
-            warnings: vec![in_words(looked, material.subject.units()[0])],
-        });
-    }
-    let names = found.unknowns.iter().map(|unknown| unknown.name.clone());
+    let by_clip = by_clip(material, motions, [before, held_out.unwrap_or(&found.fit.clips)], held_out.is_some());
+    let train: Vec<String> = by_clip.iter().map(|clip| clip.file.clone()).collect();
+    let holdout = if held_out.is_some() { train.clone() } else { Vec::new() };
     Identification {
         target: "joint".into(),
-        object: Some(material.subject.object.clone()),
-        joint: Some(material.subject.joint.name.clone()),
+        object: Some(subject.object.clone()),
+        joint: Some(subject.joint.name.clone()),
         parameters: parameters(material, found),
         not_identifiable: not_identifiable(found),
         gap,
-        clips: Clips {
-            holdout: if held_out.is_some() { files.clone() } else { Vec::new() },
-            train: files,
-            left_out: material.left_out.clone(),
-        },
+        clips: Clips { holdout, train, left_out: material.left_out.clone() },
         by_clip,
-        optimizer: "least-squares".into(),
+        optimizer: Optimizer::LeastSquares.name().into(),
         evaluations: found.fit.evaluations,
         witnesses: found.intervals.witnesses,
         misfit: found.fit.misfit().sqrt(),
         converged: found.fit.converged,
-        names: names.collect(),
+        names: found.unknowns.iter().map(|unknown| unknown.name.clone()).collect(),
         correlation: rows(&found.intervals.correlation),
         warnings: warnings(material, motions, found),
         traces: traces(material, motions, [before, &found.fit.clips], found),
@@ -82,11 +59,35 @@ pub(super) fn answer(
     }
 }
 
-fn figures(slides: bool, rms: f64) -> Figures {
+/// Errors of every clip with a motion, before and after; `in_turn`: each motion after by what the others say.
+fn by_clip(material: &Material, motions: &[Motion], fits: [&[ClipFit]; 2], in_turn: bool) -> Vec<ClipGap> {
+    let subject = &material.subject;
+    let mut first = 0;
+    let clip = |looked: &OfClip| {
+        let own = first..first + looked.motions.len();
+        first = own.end;
+        let [before, after] = fits.map(|fits| rms(subject.joint.slides, &fits[own.clone()], &motions[own.clone()]));
+        ClipGap {
+            file: looked.file.clone(),
+            used: if in_turn { "held out in turn" } else { USE_FITTED }.into(),
+            joint_rms_rad: after.joint_rms_rad.into_iter().collect(),
+            after,
+            before,
+            warnings: vec![in_words(looked, subject.units()[0])],
+        }
+    };
+    material.looked.iter().filter(|looked| !looked.motions.is_empty()).map(clip).collect()
+}
+
+/// What fits leave of motions, of a slide in metres.
+fn rms(slides: bool, fits: &[ClipFit], motions: &[Motion]) -> Figures {
+    let rows: usize = fits.iter().map(|fit| fit.rows).sum();
+    let sum: f64 = fits.iter().zip(motions).map(|(fit, motion)| fit.chi2 * motion.sigma.powi(2)).sum();
+    let rms = Some((sum / rows.max(1) as f64).sqrt());
     if slides {
-        Figures { joint_rms_m: Some(rms), ..Figures::default() }
+        Figures { joint_rms_m: rms, ..Figures::default() }
     } else {
-        Figures { joint_rms_rad: Some(rms), ..Figures::default() }
+        Figures { joint_rms_rad: rms, ..Figures::default() }
     }
 }
 

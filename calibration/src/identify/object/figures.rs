@@ -29,8 +29,8 @@ pub(super) fn fill(
 ) -> Result<(), IdentifyError> {
     let ((before, paths_before), (after, paths_after)) = (gaps(material, before, by)?, gaps(material, after, by)?);
     let files = material.usable.iter().map(|usable| usable.file.as_str());
-    let paths = paths_before.into_iter().zip(paths_after);
-    answer.traces = files.zip(paths).flat_map(|(file, paths)| traces(file, material, paths)).collect();
+    let paths = files.zip(paths_before).zip(paths_after);
+    answer.traces = paths.flat_map(|((file, before), after)| traces(file, material, before, after)).collect();
     for (clip, usable) in material.usable.iter().enumerate() {
         let held_out = material.used.split.confirm.contains(&clip);
         answer.by_clip.push(ClipGap {
@@ -56,7 +56,7 @@ fn path(clip: &Clip, prediction: &Prediction) -> Path {
     [along(0), along(1)]
 }
 
-fn traces(file: &str, material: &Material, (before, after): (Path, Path)) -> impl Iterator<Item = Trace> {
+fn traces(file: &str, material: &Material, before: Path, after: Path) -> impl Iterator<Item = Trace> {
     let noise = material.cell.object().and_then(|object| object.pose_noise.as_ref());
     let sigma = noise.map_or(0.0, |noise| noise.position);
     let file = file.to_owned();
