@@ -243,6 +243,16 @@ impl Library {
         a.confusable_with.contains(&b.name) || b.confusable_with.contains(&a.name)
     }
 
+    /// Name of a candidate.
+    pub fn name(&self, candidate: usize) -> &'static str {
+        self.candidates[candidate].effect.name
+    }
+
+    /// [`Candidate::is_of_arm`].
+    pub fn is_of_arm(&self, candidate: usize) -> bool {
+        self.candidates[candidate].is_of_arm()
+    }
+
     /// Index of the candidate with this name.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.candidates.iter().position(|candidate| candidate.effect.name == name)

@@ -21,7 +21,7 @@ pub(super) fn of_subject<E: Evidence>(
 ) -> BTreeMap<String, Values> {
     let library = pair_bench.bench.library;
     let spread = pair_bench.on_bench(&fitted.model, |bench| Some(Spread::of(bench, &fitted.hypothesis)));
-    let rough = subject.effect.is_some_and(|effect| !library.candidates[effect].is_of_arm());
+    let rough = subject.effect.is_some_and(|effect| !library.is_of_arm(effect));
     let mut all: BTreeMap<String, Values> = BTreeMap::new();
     for number in subject.numbers.clone() {
         let place = |side| {

@@ -226,7 +226,7 @@ impl<E: Likelihood> Bench<'_, E> {
 
     /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
     pub fn trying(&self, candidate: usize, effort: Effort) -> Effort {
-        Effort { holds_joints: !self.library.candidates[candidate].is_of_arm(), ..effort }
+        Effort { holds_joints: !self.library.is_of_arm(candidate), ..effort }
     }
 
     /// `full` with the candidate as strong as the score test says, within what is plausible.

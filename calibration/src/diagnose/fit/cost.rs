@@ -28,9 +28,7 @@ impl<E: Likelihood> Bench<'_, E> {
 
     /// The cost of clips with their nuisance parameters at rest: where these were fitted they hide a part of the gap.
     pub fn plain_cost(&self, clips: &[usize], full: &[f64], weights: &[f64]) -> Option<f64> {
-        let nothing = vec![0.0; self.scatter.count()];
-        let clips: Vec<_> = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
-        self.cost(full, &clips, weights)
+        self.plain_cost_below(clips, full, weights, f64::INFINITY)
     }
 
     /// [`Self::plain_cost`] where it is less than `bound`; clips are not asked any more once it is not.

@@ -45,6 +45,11 @@ pub(in crate::diagnose) fn planned(stages: &[&str]) -> Vec<Planned> {
     stages.iter().filter_map(duration).collect()
 }
 
+/// A further step.
+pub(in crate::diagnose) fn further() -> Vec<Planned> {
+    planned(&[SIGNATURES, FITS, LAST_FITS])
+}
+
 /// A search that finds one effect, and then looks for another beside it.
 pub(in crate::diagnose) fn plan(with_object: bool) -> Vec<Planned> {
     let on_the_arm: &[&str] = if with_object { &[ARM_FITS] } else { &[] };

@@ -98,7 +98,7 @@ fn beside_what_stands_out<E: Evidence>(
 impl Partly {
     /// Names of the effects that are proven, and of those that do as well as one of them.
     pub(in crate::diagnose) fn effects<E>(&self, bench: &Bench<'_, E>) -> [Vec<String>; 2] {
-        let name = |effect: &usize| bench.library.candidates[*effect].effect.name.to_owned();
+        let name = |effect: &usize| bench.library.name(*effect).to_owned();
         [&self.found.last.effects, &self.rivals].map(|effects| effects.iter().map(name).collect())
     }
 
@@ -107,7 +107,7 @@ impl Partly {
         let step = self.found.steps.iter().find(|step| step.from.effects == self.found.last.effects)?;
         let best = step.trials.iter().max_by(|a, b| a.scored.cosine.total_cmp(&b.scored.cosine))?;
         let alike = best.scored.cosine.powi(2) > MOST_OF_IT;
-        alike.then(|| bench.library.candidates[best.scored.candidate].effect.name)
+        alike.then(|| bench.library.name(best.scored.candidate))
     }
 }
 

@@ -132,7 +132,7 @@ impl Step {
         let convincing_ones: Vec<(&Trial, &Hypothesis, &Gain)> = (self.trials.iter())
             .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
             .filter(|(trial, _, advantage)| {
-                let of_arm = bench.library.candidates[trial.scored.candidate].is_of_arm();
+                let of_arm = bench.library.is_of_arm(trial.scored.candidate);
                 let (much, nearly_all) = (trial.closes > LARGE_SHARE_CLOSED, advantage.in_nearly_all());
                 // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing.
                 let rough = !of_arm && !self.object_gap();
@@ -145,7 +145,7 @@ impl Step {
                 (EFFECTS.proves(advantage, trial.scored.cost) && shown) || plain
             })
             .filter(|(trial, _, advantage)| {
-                let of_arm = bench.library.candidates[trial.scored.candidate].is_of_arm();
+                let of_arm = bench.library.is_of_arm(trial.scored.candidate);
                 !of_arm || advantage.nats > MIN_NATS_PER_ROW * self.arm_rows as f64
             })
             .filter(|(trial, _, _)| trial.is_cause())

@@ -19,7 +19,7 @@ pub(in crate::diagnose) struct Unproven<'a> {
 
 impl Unproven<'_> {
     pub(in crate::diagnose) fn effect<E>(&self, bench: &Bench<'_, E>) -> &'static str {
-        bench.library.candidates[self.trial.scored.candidate].effect.name
+        bench.library.name(self.trial.scored.candidate)
     }
 }
 

@@ -40,7 +40,7 @@ pub(in crate::diagnose) fn to_fit<E: Evidence>(
     let arm_open = arm_gap_is_open(whole, left);
     for of_arm in [true, false].into_iter().filter(|of_arm| if *of_arm { !quiet } else { !arm_open }) {
         let of_group = |s: &&Scored| {
-            let is_of_arm = bench.library.candidates[s.candidate].is_of_arm();
+            let is_of_arm = bench.library.is_of_arm(s.candidate);
             is_of_arm == of_arm || (arm_open && bench.library.arm_may_feel(s.candidate))
         };
         let group: Vec<&Scored> = scored.iter().filter(of_group).collect();
@@ -83,7 +83,7 @@ pub(in crate::diagnose) fn seen_at_the_least_scatter<'a, E: Evidence>(
     from: &Hypothesis,
     narrow: &'a [Scored],
 ) -> Vec<&'a Scored> {
-    let of_object = |s: &&Scored| !bench.library.candidates[s.candidate].is_of_arm();
+    let of_object = |s: &&Scored| !bench.library.is_of_arm(s.candidate);
     let object: Vec<&Scored> = narrow.iter().filter(of_object).collect();
     let Some(best) = object.first() else { return Vec::new() };
     let likely = |s: &&&Scored| {
@@ -103,7 +103,7 @@ pub(in crate::diagnose) fn overlooked<E: Evidence>(bench: &Bench<'_, E>, step: &
         return Vec::new();
     }
     let rest = step.trials.iter().filter(|trial| trial.fitted.is_none() && trial.scored.signal > TESTABLE);
-    let of_arm = |candidate: &usize| bench.library.candidates[*candidate].is_of_arm();
+    let of_arm = |candidate: &usize| bench.library.is_of_arm(*candidate);
     rest.map(|trial| trial.scored.candidate).filter(of_arm).collect()
 }
 

@@ -2,7 +2,7 @@
 //! rough hits there are many. Each of them is one more start of the same fit; only where it begins differs.
 
 use crate::diagnose::criteria::MOST_OF_IT;
-use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT};
 use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::trial::{Found, LARGE_SHARE_CLOSED, MIN_SHARE_CLOSED, Step, Trial};
@@ -20,12 +20,14 @@ pub(super) fn rivals_refitted<E: Evidence>(search: &Search<'_, E>, step: Step, b
     let Some(added) = added.filter(|place| step.trials[*place].own_numbers) else { return step };
     let step = step.with_fits(bench, search.split, [(added, best.clone())]);
     let chosen = step.trials[added].scored.candidate;
-    if bench.library.candidates[chosen].is_of_arm() {
+    if bench.library.is_of_arm(chosen) {
         let alike = confidence::rivals(&step, bench.library, chosen, 1.0);
         with_object_anew(search, step, |_, trial| alike.contains(&trial.scored.candidate))
     } else {
         let least = MOST_OF_IT * step.trials[added].nats();
-        with_object_anew(search, step, |k, trial| k != added && trial.nats() > least && !of_arm(bench, trial))
+        with_object_anew(search, step, |k, trial| {
+            k != added && trial.nats() > least && !bench.library.is_of_arm(trial.scored.candidate)
+        })
     }
 }
 
@@ -37,7 +39,7 @@ pub(super) fn reconsidered<E: Evidence>(search: &Search<'_, E>, step: Step) -> S
         return step;
     }
     let much = |trial: &Trial| trial.nats() > EFFECTS.min_gain_nats && trial.closes > LARGE_SHARE_CLOSED;
-    with_object_anew(search, step, |_, trial| much(trial) && !of_arm(bench, trial))
+    with_object_anew(search, step, |_, trial| much(trial) && !bench.library.is_of_arm(trial.scored.candidate))
 }
 
 /// The step with the best of the trials that are `wanted` fitted again, with the object found anew under each.
@@ -53,10 +55,6 @@ fn with_object_anew<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: imp
     };
     let fits: Vec<(usize, Hypothesis)> = places.into_iter().take(MAX_FURTHER).filter_map(anew).collect();
     step.with_fits(bench, search.split, fits)
-}
-
-fn of_arm<E>(bench: &Bench<'_, E>, trial: &Trial) -> bool {
-    bench.library.candidates[trial.scored.candidate].is_of_arm()
 }
 
 /// What a step extends, from the numbers of its best trial without that trial's effect, where it fits better by more than is near and by

@@ -75,7 +75,7 @@ impl<E: Evidence> Selection for Search<'_, E> {
                 let extended = extended.map(|fit| by_engine(self, fit, &step.weights));
                 return Some((Tried { step, restarts }, extended));
             };
-            self.bar.insert(&stages::planned(&[stages::SIGNATURES, stages::FITS, stages::LAST_FITS]));
+            self.bar.insert(&stages::further());
             from = by_engine(self, better, &step.weights);
         }
         None
@@ -99,7 +99,7 @@ fn extended<E: Evidence>(search: &Search<'_, E>, step: Step, further: bool) -> O
     }
     search.bar.stage(stages::REFINEMENT, 2);
     if further {
-        search.bar.insert(&stages::planned(&[stages::SIGNATURES, stages::FITS, stages::LAST_FITS]));
+        search.bar.insert(&stages::further());
     }
     let to_the_end = refitted(search, &fit, &step.weights)?;
     search.bar.show(1, stages::REFINEMENT);
@@ -179,7 +179,7 @@ fn fitted<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: &[usize], ove
     let asked = (0..step.trials.len()).filter(|k| wanted.contains(&step.trials[*k].scored.candidate));
     let on_arm = |place: &usize| {
         let trial = &step.trials[*place];
-        trial.own_numbers && bench.library.candidates[trial.scored.candidate].is_of_arm()
+        trial.own_numbers && bench.library.is_of_arm(trial.scored.candidate)
     };
     let (of_arm, others): (Vec<usize>, Vec<usize>) = asked.partition(on_arm);
     let mut fits = arm_alone::fitted(search, &step, &of_arm, overlooked, others.len());
@@ -189,7 +189,7 @@ fn fitted<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: &[usize], ove
             return step;
         }
         let candidate = step.trials[place].scored.candidate;
-        let label = stages::of(stages::FITS, bench.library.candidates[candidate].effect.name);
+        let label = stages::of(stages::FITS, bench.library.name(candidate));
         search.bar.show((before + done) as u64, &label);
         fits.extend(a_little(search, &step, place, overlooked).map(|fit| (place, fit)));
     }
