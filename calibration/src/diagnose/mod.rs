@@ -96,7 +96,7 @@ pub fn diagnose_kept(
         .with(&options.engine.as_ref().map(|engine| engine.ability().print()))
         .with_clips(&admitted.clips);
     let work = |work: Work<'_>| diagnosed(&session, &admitted, options, work);
-    work::kept("diagnose", (options, &session.folder), &question, interrupt, work)
+    work::kept("diagnose", options, &session.folder, &question, interrupt, work)
 }
 
 /// The session whose arm goes where it was measured, where torques are asked about; else as it is.

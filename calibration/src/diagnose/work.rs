@@ -79,7 +79,8 @@ pub(super) type Work<'a> = (&'a Interrupt, Trail<'a>);
 /// Work whose steps are kept in a folder, or beside where the answer goes, for as long as its `question` is asked.
 pub(super) fn kept<R>(
     name: &str,
-    (options, folder): (&Options, &Path),
+    options: &Options,
+    folder: &Path,
     question: &Fingerprint,
     interrupt: &Interrupt,
     work: impl FnOnce(Work<'_>) -> Result<R, DiagnoseError>,

@@ -5,8 +5,8 @@ use crate::words::parameters::{of_joints, part};
 use crate::words::quantity::{Unit, short, span};
 use crate::words::words;
 
-/// Most numbers that a line names one by one.
-const MAX_LISTED: usize = 3;
+/// Most numbers that a line names one by one, and most of the smallest changes that a sentence does.
+pub(super) const MAX_LISTED: usize = 3;
 
 /// `mass 0 to 0.520 kg (change 0.52 [0.50, 0.54] kg)`; of many numbers how far they reach.
 pub fn between(name: &str, values: &Values) -> String {

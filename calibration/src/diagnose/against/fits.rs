@@ -98,7 +98,7 @@ pub(super) fn numbers(full: Vec<f64>) -> Hypothesis {
 pub(super) fn gain(model: &Predicted, over: &Predicted, first_of_b: usize) -> Gain {
     let mut sessions = vec![Vec::new(); SIDES.len()];
     model.gains(over).for_each(|(clip, gain)| sessions[side_of(clip, first_of_b) as usize].push(gain));
-    Gain::of(sessions, CHANGES.max_of_clip_nats)
+    Gain::of(sessions, CHANGES.min_gain_nats)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::answer::{Candidate, Smallest, Values};
 use super::search::Trial;
 use crate::answer::diagnosis::{Kind, Place, Share, Status};
-use crate::diagnose::against::change::{between, smallest_in_words};
+use crate::diagnose::against::change::{MAX_LISTED, between, smallest_in_words};
 use crate::words::{channel_in_words, percent, words};
 
 /// What the sentence is made of.
@@ -21,9 +21,6 @@ pub(super) struct Facts {
     seen: Vec<String>,
 }
 
-/// So many of the smallest changes are said in the sentence.
-const MAX_SMALLEST_SAID: usize = 4;
-
 impl Facts {
     /// Of what was found.
     pub(super) fn of(candidates: &[Candidate], shrink: Share, times: f64, place: Option<&Place>) -> Self {
@@ -36,7 +33,7 @@ impl Facts {
         let (changes, rivals): (Vec<&Candidate>, Vec<&Candidate>) =
             open.iter().partition(|candidate| fitted(candidate));
         let seen = candidates.iter().filter(|candidate| candidate.status == Status::RuledOut);
-        let seen = seen.filter_map(said_smallest).take(MAX_SMALLEST_SAID).collect();
+        let seen = seen.filter_map(said_smallest).take(MAX_LISTED).collect();
         let [low, high] = shrink.ci90.map(percent);
         Self {
             changes: changes.into_iter().map(change).collect(),

@@ -35,6 +35,7 @@ pub use pair::{Pair, Unlike};
 use super::work::{self, DiagnoseError, Options, Question, Work};
 
 use crate::answer::diagnosis::SensorGap;
+use crate::diagnose::criteria::{DOUBTFUL_EXCESS, MOST_OF_IT};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::stages;
 use crate::diagnose::judge::gap::Residuals;
@@ -87,7 +88,7 @@ pub fn compare_kept(
         .with_cell(&sessions[1].cell)
         .with_clips(&pair.admitted.clips);
     let work = |work: Work<'_>| compared(sessions, &pair, options, work);
-    Ok(work::kept("against", (options, &sessions[1].folder), &question, interrupt, work)?)
+    Ok(work::kept("against", options, &sessions[1].folder, &question, interrupt, work)?)
 }
 
 /// The same of clips that were admitted already; of the sessions only cells and names count.
@@ -153,14 +154,14 @@ impl Question for Changed<'_> {
     }
 }
 
-/// Whether the parameters alone leave of A so little beyond the noise that an effect has nothing to explain.
+/// Whether the parameters alone leave of A so little beyond the noise that an effect has nothing to explain: as far below doubt as where
+/// sessions in which no cause is seen have none ([`crate::diagnose::criteria::NONE_IS_RIGHT`]).
 fn is_explained<E: Evidence>(bench: &Bench<'_, E>, of_a: &Split, baseline: &Hypothesis) -> bool {
     let Some(left) = Residuals::at(bench, baseline, &of_a.open()) else { return false };
-    SensorGap::of_groups(&left.typical(), &left.typical()).iter().all(|left| left.gaps() < MAX_GAPS_OF_NOTHING)
+    SensorGap::of_groups(&left.typical(), &left.typical())
+        .iter()
+        .all(|left| left.gaps() < MOST_OF_IT * DOUBTFUL_EXCESS.value)
 }
-
-/// So much of the least gap is none: engines that integrate in other steps differ by less.
-const MAX_GAPS_OF_NOTHING: f64 = 0.25;
 
 /// Which clips of both are for what: as of one session where each has enough commands; else each command of A is left out in
 /// turn, together with one of B.

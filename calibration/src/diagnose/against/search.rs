@@ -13,6 +13,7 @@ use crate::diagnose::select::criteria::CHANGES;
 use crate::diagnose::select::forward::{Selection, backward, forward};
 use crate::diagnose::select::gain::Gain;
 use inference::likelihood::Evidence;
+use inference::statistics::normal;
 use shared_mem::progress::Progress;
 
 /// At most so many effects that both sessions have are found on the way.
@@ -291,11 +292,14 @@ fn placed(model: &Model, subject: &Subject, others: &[Vec<f64>; 2]) -> Model {
 /// change has to be worth, less what its numbers gain by chance.
 pub(super) fn smallest_seen(sigma: f64, cost: usize) -> f64 {
     let needed = CHANGES.price(cost) + 0.5 * cost as f64;
-    sigma * (NINE_OF_TEN_SIGMAS + (NINE_OF_TEN_SIGMAS * NINE_OF_TEN_SIGMAS + 2.0 * needed).sqrt())
+    let below = nine_of_ten_sigmas();
+    sigma * (below + (below * below + 2.0 * needed).sqrt())
 }
 
-/// Nine of ten normal numbers lie above so many sigmas below their mean.
-const NINE_OF_TEN_SIGMAS: f64 = 1.2816;
+/// Nine of ten normal numbers lie above so many sigmas below their mean: eight of ten between these and as many above it.
+fn nine_of_ten_sigmas() -> f64 {
+    normal(0.8)
+}
 
 #[cfg(test)]
 mod tests {
@@ -305,7 +309,7 @@ mod tests {
     fn a_change_of_the_smallest_size_that_is_seen_gains_enough_in_nine_of_ten() {
         let size = smallest_seen(1.0, 1);
         let gained = |noise: f64| 0.5 * size * size + noise * size;
-        assert!((gained(-NINE_OF_TEN_SIGMAS) - (CHANGES.min_gain_nats + 0.5)).abs() < 1e-9, "{size}");
+        assert!((gained(-nine_of_ten_sigmas()) - (CHANGES.min_gain_nats + 0.5)).abs() < 1e-9, "{size}");
         assert!(smallest_seen(1.0, 7) > size && (smallest_seen(0.1, 1) / size - 0.1).abs() < 1e-9);
     }
 }

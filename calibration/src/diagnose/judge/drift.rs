@@ -5,13 +5,12 @@
 //! leads further than clips scatter.
 
 use crate::diagnose::fit::bench::Hypothesis;
+use crate::diagnose::select::gain::CHANCE_SIGMAS;
 use inference::likelihood::object::Nuisance;
 use inference::likelihood::random_effects::RandomEffects;
 use inference::statistics::student_sigmas;
 
-/// A slope of so many sigmas of a normal distribution, or as unlikely a one of few clips, is no chance: p = 0.02.
-const MIN_SLOPE_SIGMAS: f64 = 2.33;
-/// ... and over the session the friction changes by so many sigmas of its scatter from clip to clip.
+/// A slope that is no chance counts where over the session the friction changes by so many sigmas of its scatter from clip to clip.
 const MIN_CHANGE_SIGMAS: f64 = 6.0;
 /// A line through fewer clips tells nothing.
 const MIN_CLIPS: usize = 5;
@@ -39,7 +38,7 @@ fn trend(points: &[(f64, f64)]) -> Option<f64> {
     let (slope, degrees) = (xy / xx, count - 2);
     let error = ((yy - slope * xy).max(0.0) / degrees as f64 / xx).sqrt();
     let span = points.last()?.0 - points.first()?.0;
-    (slope.abs() > student_sigmas(MIN_SLOPE_SIGMAS, degrees) * error).then_some(slope * span)
+    (slope.abs() > student_sigmas(CHANCE_SIGMAS, degrees) * error).then_some(slope * span)
 }
 
 #[cfg(test)]

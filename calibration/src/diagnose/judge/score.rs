@@ -92,7 +92,7 @@ impl Predicted {
     /// What this hypothesis is worth over another on the same clips of one session.
     pub fn over(&self, other: &Self) -> Gain {
         let gains = self.gains(other).map(|(_, gain)| gain).collect();
-        Gain::of(vec![gains], EFFECTS.max_of_clip_nats)
+        Gain::of(vec![gains], EFFECTS.min_gain_nats)
     }
 
     /// By how much each clip is likelier than under another hypothesis [nats].

@@ -1,7 +1,7 @@
 //! Which candidates are worth a fit.
 
 use crate::answer::diagnosis::SensorGap;
-use crate::diagnose::criteria::{MOST_OF_IT, OBJECT_EXCESS};
+use crate::diagnose::criteria::{JOINTS_EXCESS, MOST_OF_IT, OBJECT_EXCESS};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
 use crate::diagnose::judge::gap::Typical;
@@ -10,8 +10,6 @@ use crate::diagnose::select::criteria::EFFECTS;
 use inference::likelihood::Evidence;
 use twin::effects::Stage;
 
-/// An arm whose gap is smaller than this in squared sigmas is not the cause of what an object does.
-const QUIET_ARM_EXCESS: f64 = 0.5;
 /// So many candidates are fitted besides because they stand out at the least scatter, and so many trials of a step once more with the
 /// object found anew under them (a choice).
 pub(in crate::diagnose) const MAX_FURTHER: usize = 2;
@@ -36,7 +34,8 @@ pub(in crate::diagnose) fn to_fit<E: Evidence>(
         let group = left.iter().find(|group| group.of_object == of_object);
         group.map_or(0.0, |group| group.mean_square - group.floor)
     };
-    let quiet = left.len() > 1 && beyond(false) < QUIET_ARM_EXCESS;
+    // An arm without a gap is not the cause of what an object does.
+    let quiet = left.len() > 1 && beyond(false) < JOINTS_EXCESS.value;
     let arm_open = arm_gap_is_open(whole, left);
     for of_arm in [true, false].into_iter().filter(|of_arm| if *of_arm { !quiet } else { !arm_open }) {
         let of_group = |s: &&Scored| {

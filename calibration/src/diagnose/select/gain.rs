@@ -5,8 +5,8 @@ use inference::statistics::{median, student_sigmas};
 /// A clip's gain or loss counts up to so many times that of its session's clip in the middle (a choice): no clip decides alone, and none
 /// makes what all the others say uncertain.
 const MAX_OF_MEDIAN: f64 = 5.0;
-/// What chance makes of a gain reaches so many standard errors, were these known exactly: 2.3 % of a normal distribution lie above.
-const CHANCE_SIGMAS: f64 = 2.0;
+/// What chance makes of a gain, or of a slope, reaches so many standard errors, were these known exactly: 2.3 % of a normal distribution lie above.
+pub const CHANCE_SIGMAS: f64 = 2.0;
 /// Models are worth the same that differ by less [nats]: a likelihood ratio of 55. Nats count less than they say, since twins are never
 /// exact: over this temperature shares of the evidence agree with frequencies.
 pub const SAME_WORTH_NATS: f64 = 4.0;
