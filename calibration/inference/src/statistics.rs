@@ -2,7 +2,7 @@
 
 pub use shared_mem::statistics::median;
 
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor, Normal, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Normal, StudentsT};
 
 /// The lowest and the highest of some values; of none the lowest is infinite.
 pub fn extent(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
@@ -33,6 +33,11 @@ pub fn student_sigmas(sigmas: f64, free: usize) -> f64 {
     StudentsT::new(0.0, 1.0, free.max(1) as f64).map_or(f64::INFINITY, |t| t.inverse_cdf(chance))
 }
 
+/// The chance of more than `value` in a chi-square of so many degrees of freedom, at least 1.
+pub fn beyond_chi_square(value: f64, free: usize) -> f64 {
+    ChiSquared::new(free.max(1) as f64).map_or(1.0, |chi| chi.sf(value.max(0.0)))
+}
+
 /// The chance of more than `value` in Fisher's distribution; 1 where there are no degrees of freedom.
 pub fn beyond_f(value: f64, above: usize, below: usize) -> f64 {
     FisherSnedecor::new(above as f64, below as f64).map_or(1.0, |f| f.sf(value))
@@ -50,6 +55,10 @@ mod tests {
         }
         assert!((student_sigmas(normal(0.95), 4) - student(0.95, 4)).abs() < 1e-9);
         assert!((student(0.9, 10) - 1.8125).abs() < 1e-3 && student(0.9, 0).is_infinite());
+        for (value, free, chance) in [(3.841, 1, 0.05), (6.635, 1, 0.01), (14.067, 7, 0.05), (29.141, 14, 0.01)] {
+            assert!((beyond_chi_square(value, free) / chance - 1.0).abs() < 1e-3, "{value} {free}");
+        }
+        assert!(beyond_chi_square(-1.0, 3) == 1.0 && beyond_chi_square(1e5, 1) < 1e-9);
         assert!((beyond_f(3.2172, 6, 10) - 0.05).abs() < 1e-3 && beyond_f(1.0, 6, 0) == 1.0);
     }
 }

@@ -4,6 +4,7 @@ use super::answer::{Candidate, Smallest, Values};
 use super::search::Trial;
 use crate::answer::diagnosis::{Kind, Place, Share, Status};
 use crate::diagnose::against::change::{MAX_LISTED, between, smallest_in_words};
+use crate::diagnose::select::criteria::CHANGES;
 use crate::words::{channel_in_words, percent, words};
 
 /// What the sentence is made of.
@@ -102,7 +103,7 @@ pub(super) fn reason(status: Status, slopes: Option<(f64, f64)>, trial: Option<&
         (Status::Named | Status::Possible, Some(gained), _) => gained,
         (Status::NotTestable, ..) => "no change of a plausible size would have been seen".into(),
         (_, Some(gained), _) => format!("{gained}: chance, or another change does better"),
-        (_, None, Some((p, _))) if p < 0.05 => "its slopes explain far less than those of others".into(),
+        (_, None, Some((p, _))) if p < CHANGES.max_chance => "its slopes explain far less than those of others".into(),
         (_, None, Some((p, _))) => format!("its slopes explain no more than chance does (p = {p:.2})"),
         (_, None, None) => "it was not looked at".into(),
     }

@@ -10,12 +10,12 @@ use super::fits::PairBench;
 use super::subjects::Subject;
 use super::turned::{Acts, Model, SIDES, Side, side_of};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::shortlist::{Scored, chance};
+use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use crate::diagnose::propose::signatures::weights;
 use inference::estimate::quadratic::{bounded_minimum, eliminate, minimum};
 use inference::likelihood::Evidence;
-use inference::statistics::student_sigmas;
+use inference::statistics::{beyond_chi_square, student_sigmas};
 use nalgebra::{DMatrix, DVector};
 
 /// A change as the slopes have it.
@@ -211,7 +211,7 @@ impl Slopes {
             gain: found.gain,
             gain_shared: 0.0,
             cost,
-            p: chance(found.gain, cost),
+            p: beyond_chi_square(found.gain, cost),
             starts: [[model.of(Side::A).clone(), in_b], same],
             sigma,
         })
@@ -267,7 +267,15 @@ impl Slopes {
             (size, (at_one - library.unknowns[size].start).abs() * self.sigma(&others, &held, [None, in_b]))
         });
         let sigma = sigma.collect();
-        Some(Score { subject: index, gain, gain_shared: both.gain, cost: count, p: chance(gain, count), starts, sigma })
+        Some(Score {
+            subject: index,
+            gain,
+            gain_shared: both.gain,
+            cost: count,
+            p: beyond_chi_square(gain, count),
+            starts,
+            sigma,
+        })
     }
 }
 

@@ -3,6 +3,7 @@
 use super::sweep::{Column, Swept};
 use crate::diagnose::library::Library;
 use inference::estimate::quadratic::{bounded_minimum, eliminate};
+use inference::statistics::beyond_chi_square;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -79,7 +80,7 @@ pub fn score(swept: &Swept, sum: &DMatrix<f64>, library: &Library) -> Vec<Scored
             let (signal, imitated) = (beyond.sqrt(), (1.0 - beyond / power.max(f64::MIN_POSITIVE)).max(0.0));
             let cost = free.len() + alternative.form.len().min(1);
             let cosine = (found.gain.max(0.0) / left[(0, 0)].max(f64::MIN_POSITIVE)).sqrt().min(1.0);
-            let p = chance(found.gain, cost);
+            let p = beyond_chi_square(found.gain, cost);
             let (units, next, gain) = (found.at, Vec::new(), found.gain);
             Some(Scored { candidate, alternative: a, units, next, gain, cost, cosine, signal, imitated, p })
         });
@@ -98,43 +99,4 @@ pub fn score(swept: &Swept, sum: &DMatrix<f64>, library: &Library) -> Vec<Scored
 /// Gain less what its numbers gain from noise.
 fn worth(scored: &Scored) -> f64 {
     scored.gain - 2.0 * scored.cost as f64
-}
-
-/// Probability that a chi-square of `freedom` exceeds `value` (Wilson and Hilferty 1931: its cube root is nearly normal).
-pub fn chance(value: f64, freedom: usize) -> f64 {
-    if value <= 0.0 {
-        return 1.0;
-    }
-    let k = freedom.max(1) as f64;
-    let spread = 2.0 / (9.0 * k);
-    let z = ((value / k).cbrt() - (1.0 - spread)) / spread.sqrt();
-    upper_tail(z)
-}
-
-/// Probability that a standard normal number exceeds `z` (Abramowitz and Stegun 26.2.17, error below 1e-7; beyond z = 6 the
-/// leading term of the asymptotic series).
-pub fn upper_tail(z: f64) -> f64 {
-    if z < 0.0 {
-        return 1.0 - upper_tail(-z);
-    }
-    let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
-    if z > 6.0 {
-        return density / z;
-    }
-    let t = 1.0 / (1.0 + 0.231_641_9 * z);
-    let series = [0.319_381_530, -0.356_563_782, 1.781_477_937, -1.821_255_978, 1.330_274_429];
-    density * series.iter().rev().fold(0.0, |sum, c| (sum + c) * t)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn chances_agree_with_tables_of_the_chi_square() {
-        for (value, freedom, p) in [(3.841, 1, 0.05), (6.635, 1, 0.01), (14.067, 7, 0.05), (29.141, 14, 0.01)] {
-            let found = chance(value, freedom);
-            assert!((found / p - 1.0).abs() < 0.07, "{value} {freedom}: {found} instead of {p}");
-        }
-    }
 }
