@@ -11,8 +11,8 @@ use inference::likelihood::{Evidence, Group};
 /// A gap smaller than this, over its floor, is taken for this size.
 const MIN_GAP_RATIO: f64 = 1.2;
 
-/// How much of the way is gone between two hypotheses on all clips but those for confirming, of the group of sensors in which it is largest; 0
-/// where the gap widens on clips that were not fitted. `whole`: what the baseline leaves.
+/// How much of the way is gone between two hypotheses on all clips but those for confirming, of the group of sensors in which it is
+/// largest; 0 where the gap widens on clips that were not fitted. `whole`: what the baseline leaves.
 pub fn closes<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,

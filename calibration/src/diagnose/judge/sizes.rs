@@ -107,8 +107,8 @@ fn size_in_words(torques: Option<f64>, joints: Option<f64>, add: Option<f64>) ->
     }
 }
 
-/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, each with numbers that were not fitted to them, by the code of `twin replay`; of strokes
-/// by whoever simulates them.
+/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, each with numbers that were not fitted to them, by the code of
+/// `twin replay`; of strokes by whoever simulates them.
 fn replayed<E: Evidence>(
     bench: &Bench<'_, E>,
     both: [&Fits; 2],

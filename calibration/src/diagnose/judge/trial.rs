@@ -129,33 +129,30 @@ impl Found {
 impl Step {
     /// The trial that is worth most among those worth it.
     pub fn best<E: Evidence>(&self, bench: &Bench<'_, E>) -> Option<(&Trial, &Hypothesis, &Gain)> {
-        let convincing_ones: Vec<(&Trial, &Hypothesis, &Gain)> = (self.trials.iter())
-            .filter_map(|trial| trial.fitted.as_ref().map(|(fit, advantage)| (trial, fit, advantage)))
-            .filter(|(trial, _, advantage)| {
-                let of_arm = bench.library.is_of_arm(trial.scored.candidate);
-                let (much, nearly_all) = (trial.closes > LARGE_SHARE_CLOSED, advantage.in_nearly_all());
-                // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing.
-                let rough = !of_arm && !self.object_gap();
-                let shown = !rough || (much && self.is_alone(bench.library, trial.scored.candidate));
-                // ... and beside a cause that was found before, a gain on nearly all of them neither.
-                let plain = much
-                    && nearly_all
-                    && advantage.nats > EFFECTS.min_gain_nats
-                    && (shown || self.from.effects.is_empty());
-                (EFFECTS.proves(advantage, trial.scored.cost) && shown) || plain
-            })
-            .filter(|(trial, _, advantage)| {
-                let of_arm = bench.library.is_of_arm(trial.scored.candidate);
-                !of_arm || advantage.nats > MIN_NATS_PER_ROW * self.arm_rows as f64
-            })
-            .filter(|(trial, _, _)| trial.is_cause())
-            .filter(|(trial, fit, _)| !bench.negligible(trial.scored.candidate, &fit.full))
-            .filter(|(trial, fit, _)| !bench.is_convention(trial.scored.candidate, fit))
-            .collect();
+        let fitted = self.trials.iter().filter_map(|trial| trial.fitted.as_ref().map(|(fit, gain)| (trial, fit, gain)));
+        let convincing_ones: Vec<(&Trial, &Hypothesis, &Gain)> =
+            fitted.filter(|(trial, fit, gain)| self.convinces(bench, trial, fit, gain)).collect();
         let simplest =
             |(trial, ..): &&(&Trial, _, _)| !convincing_ones.iter().any(|(other, ..)| trial.is_outdone_by(other));
         let worth = |(trial, _, advantage): &(&Trial, _, &Gain)| advantage.net(trial.scored.cost);
         convincing_ones.iter().filter(simplest).max_by(|a, b| worth(a).total_cmp(&worth(b))).copied()
+    }
+
+    /// Whether it is no chance that a trial gains this, and what it gains no numerics.
+    fn convinces<E: Evidence>(&self, bench: &Bench<'_, E>, trial: &Trial, fit: &Hypothesis, gain: &Gain) -> bool {
+        let (library, candidate) = (bench.library, trial.scored.candidate);
+        let (of_arm, much) = (library.is_of_arm(candidate), trial.closes > LARGE_SHARE_CLOSED);
+        // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing ...
+        let shown = of_arm || self.object_gap() || (much && self.is_alone(library, candidate));
+        // ... and beside a cause that was found before, a gain on nearly all of them neither.
+        let may_show = shown || self.from.effects.is_empty();
+        let plain = much && gain.in_nearly_all() && gain.nats > EFFECTS.min_gain_nats && may_show;
+        let proven = EFFECTS.proves(gain, trial.scored.cost) && shown;
+        (proven || plain)
+            && (!of_arm || gain.nats > MIN_NATS_PER_ROW * self.arm_rows as f64)
+            && trial.is_cause()
+            && !bench.negligible(candidate, &fit.full)
+            && !bench.is_convention(candidate, fit)
     }
 
     /// The same with fits of trials, at their places, judged by what they predict and close.

@@ -20,7 +20,8 @@ const SLIDE_EXCESS: f64 = 0.5 * OBJECT_EXCESS.value;
 /// Candidates worth a fit, the arm's and the object's each among themselves: those that the score test cannot rule out, the
 /// best first; of the others only partners that the best is easily taken for. While the arm has a gap of its own, only what the arm feels
 /// is: how an object is hit by an arm that is elsewhere tells nothing of the object. Where the object's gap is not small all effects
-/// on the slide are fitted, where it is large all on the hit and of the camera as well: an impact answers so unevenly that slopes at one point tell little.
+/// on the slide are fitted, where it is large all on the hit and of the camera as well: an impact answers so unevenly that slopes at one
+/// point tell little.
 pub(in crate::diagnose) fn to_fit<E: Evidence>(
     bench: &Bench<'_, E>,
     from: &Hypothesis,
