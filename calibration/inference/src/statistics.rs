@@ -14,6 +14,11 @@ pub fn normal(level: f64) -> f64 {
     Normal::standard().inverse_cdf(0.5 + 0.5 * level)
 }
 
+/// What an interval of so many sigmas to either side holds of a normal distribution: the inverse of [`normal`].
+pub fn level(sigmas: f64) -> f64 {
+    2.0 * Normal::standard().cdf(sigmas) - 1.0
+}
+
 /// Half the interval that holds `level` of Student's distribution with `free` degrees of freedom; infinite for none.
 ///
 /// ```
@@ -29,8 +34,7 @@ pub fn student(level: f64, free: usize) -> f64 {
 
 /// How many standard errors of an estimate with `free` degrees of freedom, at least 1, are as rare as `sigmas` of a normal one.
 pub fn student_sigmas(sigmas: f64, free: usize) -> f64 {
-    let chance = Normal::standard().cdf(sigmas);
-    StudentsT::new(0.0, 1.0, free.max(1) as f64).map_or(f64::INFINITY, |t| t.inverse_cdf(chance))
+    student(level(sigmas), free.max(1))
 }
 
 /// The chance of more than `value` in a chi-square of so many degrees of freedom, at least 1.

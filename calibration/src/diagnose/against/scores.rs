@@ -13,9 +13,10 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use crate::diagnose::propose::signatures::weights;
+use inference::estimate::interval::half_width;
 use inference::estimate::quadratic::{bounded_minimum, eliminate, minimum};
 use inference::likelihood::Evidence;
-use inference::statistics::{beyond_chi_square, student_sigmas};
+use inference::statistics::{beyond_chi_square, level};
 use nalgebra::{DMatrix, DVector};
 
 /// A change as the slopes have it.
@@ -93,8 +94,8 @@ impl Slopes {
         over(self.forms.each_ref().map(Some), columns)
     }
 
-    /// One sigma of the coefficient of a column, those of the others at their best: the larger of what the curvature says and what
-    /// the scatter of the clips' slopes says (a sandwich).
+    /// One sigma of the coefficient of a column, those of the others at their best, by the rule of all intervals: what the curvature says,
+    /// or what the scatter of the clips' slopes says (a sandwich).
     fn sigma(&self, others: &[Place], held: &[f64], column: Place) -> f64 {
         let columns = [others, &[column]].concat();
         let form = self.form(&columns);
@@ -122,8 +123,7 @@ impl Slopes {
         let slopes: Vec<f64> = clips.map(of_clip).collect();
         let count = slopes.len();
         let spread = slopes.iter().map(|slope| slope * slope).sum::<f64>() * count as f64 / (count.max(2) - 1) as f64;
-        let by_clips = student_sigmas(1.0, count.saturating_sub(1)) * spread.sqrt() / information;
-        information.sqrt().recip().max(by_clips)
+        half_width(level(1.0), information.sqrt().recip(), spread.sqrt() / information, count)
     }
 }
 
