@@ -1,8 +1,7 @@
 //! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by the steps of
 //! `descend`.
 
-use super::effort::{Effort, PROBE};
-use super::multi_start::Tried;
+use super::effort::Effort;
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
 use crate::diagnose::library::Library;
@@ -196,20 +195,6 @@ impl<E: Likelihood> Bench<'_, E> {
         };
         let forms = at.reduced(self.evidence, weights).ok()?;
         Some(Hypothesis { effects: effects.to_vec(), full, free, fitted: FittedClip::all(restarted, forms) })
-    }
-
-    /// What the clips of a hypothesis cost at `full` after one step of some numbers alone, and the numbers then. `None` when the
-    /// twin has no answer there.
-    pub(in crate::diagnose) fn after_a_step(
-        &self,
-        from: &Hypothesis<E::Own>,
-        full: Vec<f64>,
-        moving: &[usize],
-        weights: &[f64],
-    ) -> Option<Tried> {
-        let clips = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
-        let (Reached { full, clips, .. }, _) = self.descended(full, clips, moving, weights, PROBE)?;
-        Some(Tried { cost: self.cost(&full, &clips, weights)?, numbers: full })
     }
 
     pub(in crate::diagnose) fn linearise(

@@ -1,8 +1,8 @@
 //! One fit from several starts: a local solver finds the nearest minimum, and over hits, sticking joints and limits there are many. What
 //! differs from effect to effect, and from clip to clip, is where its fits begin, and that is data.
 
-use super::bench::{Bench, Hypothesis};
-use super::effort::Effort;
+use super::bench::{Bench, Hypothesis, Reached};
+use super::effort::{Effort, PROBE};
 use inference::likelihood::Likelihood;
 
 /// What was fitted or tried, with its cost.
@@ -68,6 +68,22 @@ impl<E: Likelihood> MultiStart<'_, E> {
         begun.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
         let onwards = |fit: &Hypothesis<E::Own>| MultiStart { near: Some(fit), ..*self }.fit(fit.full.clone(), further);
         cheapest(begun.iter().take(count).filter_map(onwards))
+    }
+}
+
+impl<E: Likelihood> Bench<'_, E> {
+    /// What the clips of a hypothesis cost at `full` after one step of some numbers alone, and the numbers then. `None` when the
+    /// twin has no answer there.
+    pub(in crate::diagnose) fn after_a_step(
+        &self,
+        from: &Hypothesis<E::Own>,
+        full: Vec<f64>,
+        moving: &[usize],
+        weights: &[f64],
+    ) -> Option<Tried> {
+        let clips = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
+        let (Reached { full, clips, .. }, _) = self.descended(full, clips, moving, weights, PROBE)?;
+        Some(Tried { cost: self.cost(&full, &clips, weights)?, numbers: full })
     }
 }
 

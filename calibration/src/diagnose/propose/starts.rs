@@ -9,10 +9,9 @@ use crate::diagnose::library::Candidate;
 use inference::likelihood::{Likelihood, Setting};
 use twin::effects::{Search, Stage};
 
-/// Shares of the strongest plausible size at which candidates are tried (choices): one beyond the arm beside where its slope points; one
-/// whose slope tells little along each direction; a patch in every place; one without a slope; and one in a joint together with the gains
-/// of that joint, up to what simpler machines have.
-const BESIDE_ITS_SLOPE: [f64; 1] = [0.3];
+/// Shares of the strongest plausible size at which candidates are tried (choices): one whose slope tells little along each direction, and
+/// at the middle share one beyond the arm beside where its slope points; a patch in every place; one without a slope; and one in a joint
+/// together with the gains of that joint, up to what simpler machines have.
 const EACH_DIRECTION: [f64; 3] = [0.1, 0.3, 0.6];
 const IN_EACH_PLACE: [f64; 2] = [0.4, 0.8];
 const WITHOUT_A_SLOPE: [f64; 4] = [0.06, 0.2, 0.5, 1.0];
@@ -55,7 +54,7 @@ fn pointed_at<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64
     }
     let one_probe = candidate.alternatives[scored.alternative].probes.len() == 1;
     if one_probe && !candidate.is_of_arm() {
-        starts.extend(aside(candidate, scored, &BESIDE_ITS_SLOPE));
+        starts.extend(aside(candidate, scored, &EACH_DIRECTION[1..2]));
     }
     let mut numbers: Vec<Vec<f64>> = starts.iter().map(|start| at.begun(start)).collect();
     if has_places(candidate) {
