@@ -2,8 +2,8 @@
 
 use super::verdict::{Decision, Finding};
 use crate::answer::diagnosis::{Kind, Share};
+use crate::diagnose::judge::closing::MIN_SHARE_CLOSED;
 use crate::diagnose::judge::gap::Shrunk;
-use crate::diagnose::judge::trial::MIN_SHARE_CLOSED;
 use crate::words::{percent, words};
 
 /// What the sentence is made of, beside the finding itself.

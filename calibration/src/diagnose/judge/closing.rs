@@ -1,13 +1,15 @@
 //! How much of the gap a fit closes when nothing of a clip's own is fitted.
 
 use super::gap::{Residuals, Typical};
-use super::trial::MIN_SHARE_CLOSED;
 
 use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use inference::admit::Split;
 use inference::likelihood::{Evidence, Group};
 
+/// A cause closes more than this share of the gap: what helps only beside nuisance parameters of clips is none. A gap that widens by less
+/// does so by chance, and what leaves more of what the best gains on the arm is not what acts there (a choice).
+pub const MIN_SHARE_CLOSED: f64 = 0.1;
 /// A gap smaller than this, over its floor, is taken for this size.
 const MIN_GAP_RATIO: f64 = 1.2;
 

@@ -4,11 +4,11 @@
 //! meets a corner, or misses it, ends elsewhere by more than any cause explains. So how far its path shrinks in the mean of
 //! squares is a matter of single clips; the likelihood knows how far objects deviate, and what the joints in contact show.
 
+use super::closing::MIN_SHARE_CLOSED;
 use super::gap::{Residuals, Shrunk};
 use super::held_out::Fits;
 use super::remainder;
 use super::score::predict_unseen;
-use super::trial::MIN_SHARE_CLOSED;
 use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::select::gain::Gain;

@@ -1,6 +1,6 @@
 //! Candidates tried on top of a hypothesis, and what makes one of them a cause.
 
-use super::closing::closes;
+use super::closing::{MIN_SHARE_CLOSED, closes};
 use super::gap::{Residuals, Typical};
 use super::score::{Predicted, predict};
 use crate::diagnose::criteria::{MOST_OF_IT, OBJECT_EXCESS};
@@ -15,9 +15,6 @@ use inference::likelihood::Evidence;
 
 /// An effect on the arm must be worth more than this for each of its residuals [nats]: there are so many that the least numerics add up.
 pub(in crate::diagnose) const MIN_NATS_PER_ROW: f64 = 0.0025;
-/// A cause closes more than this share of the gap: what helps only beside nuisance parameters of clips is none. A gap that widens by less
-/// does so by chance, and what leaves more of what the best gains on the arm is not what acts there (a choice).
-pub const MIN_SHARE_CLOSED: f64 = 0.1;
 /// Of one that closes so much of the gap, and predicts nearly all clips better, one that it predicts worse does not matter.
 pub(in crate::diagnose) const LARGE_SHARE_CLOSED: f64 = 0.3;
 /// A gain of so many of its standard errors is no chance.

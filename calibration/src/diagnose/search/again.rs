@@ -4,8 +4,9 @@
 use crate::diagnose::criteria::MOST_OF_IT;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT};
+use crate::diagnose::judge::closing::MIN_SHARE_CLOSED;
 use crate::diagnose::judge::confidence;
-use crate::diagnose::judge::trial::{Found, LARGE_SHARE_CLOSED, MIN_SHARE_CLOSED, Step, Trial};
+use crate::diagnose::judge::trial::{Found, LARGE_SHARE_CLOSED, Step, Trial};
 use crate::diagnose::propose::Search;
 use crate::diagnose::propose::screening::MAX_FURTHER;
 use crate::diagnose::select::criteria::EFFECTS;
