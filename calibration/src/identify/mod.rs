@@ -9,7 +9,8 @@
 //! | `used` | which clips are fitted, held out, left out |
 //! | `options`, `error` | what an arm or an object is identified from, and how; why it cannot be |
 //! | `finding`, `figures` | a fit number by number; how far the twin is off over sets of clips |
-//! | `run` | the way of searching, its progress, its interruption and resumption |
+//! | `run` | a search: its way, its progress, its resumption |
+//! | `work` | what is kept of long work and what ends it, until its answer is in its file |
 
 pub mod arm;
 mod error;
@@ -22,8 +23,8 @@ mod run;
 #[cfg(test)]
 mod test_finding;
 mod used;
+mod work;
 
 pub use crate::answer::identification::Identification;
 pub use error::IdentifyError;
-pub use options::Options;
-pub use run::Optimizer;
+pub use options::{Optimizer, Options};

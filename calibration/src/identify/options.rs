@@ -1,17 +1,36 @@
-//! What an arm or an object is identified from, and how; what the answer says of that.
+//! What an arm or an object is identified from, and how; what the answer depends on.
 
 use super::error::IdentifyError;
-use super::run::{Optimizer, Work, stopped};
-use crate::answer::identification::Identification;
-use inference::engine::{Engine, Used};
-use inference::interrupt::Interrupt;
-use inference::kept::{self, Fingerprint};
+use inference::engine::Engine;
+use inference::kept::Fingerprint;
 use shared_mem::cell::Cell;
-use shared_mem::recording::{Clip, SessionFiles};
+use shared_mem::recording::Clip;
 use shared_mem::theta::Theta;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
+
+/// Ways of searching.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Optimizer {
+    /// Bounded least squares on rollouts.
+    #[default]
+    LeastSquares,
+    /// A particle swarm.
+    Swarm,
+    /// Covariance matrix adaptation.
+    Evolution,
+}
+
+impl Optimizer {
+    /// Name on command lines and in answers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LeastSquares => "least-squares",
+            Self::Swarm => "pso",
+            Self::Evolution => "cma",
+        }
+    }
+}
 
 /// Of an arm or an object.
 #[derive(Debug, Clone, Default)]
@@ -58,36 +77,5 @@ impl Options {
             .with_cell(cell)
             .with(&self.engine.as_ref().map(|engine| engine.ability().print()))
             .with_clips(clips)
-    }
-
-    /// The answer to a question that `work` finds, its steps kept until the parameters are in their file.
-    pub(super) fn answered(
-        &self,
-        target: &str,
-        question: &Fingerprint,
-        interrupt: &Interrupt,
-        work: impl FnOnce(Work<'_>) -> Result<(Identification, Theta), IdentifyError>,
-    ) -> Result<Identification, IdentifyError> {
-        let began = Instant::now();
-        let verb = format!("identify_{target}");
-        let kept = kept::for_work(self.out.as_deref(), &self.session, &verb, question, interrupt);
-        let steps = Work { kept: &kept, interrupt };
-        let found = work(steps);
-        interrupt.work_is_over();
-        // What work says that was cut short is no answer.
-        stopped(steps)?;
-        let (mut answer, theta) = found?;
-        if let Some(out) = &self.out {
-            theta.write(out)?;
-            answer.theta_file = Some(out.clone());
-        }
-        kept.done();
-        answer.session = self.session.display().to_string();
-        answer.files = SessionFiles { session: self.session.clone(), cell: self.cell.clone() };
-        answer.optimizer = self.optimizer.name().into();
-        answer.engine = self.engine.as_ref().map(|engine| engine.used());
-        answer.warnings.extend(answer.engine.iter().flat_map(Used::sentences));
-        answer.seconds = began.elapsed().as_secs_f64();
-        Ok(answer)
     }
 }

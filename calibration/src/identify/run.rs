@@ -1,42 +1,19 @@
-//! One search over clips: by least squares or without slopes, with a bar, and so that Ctrl-C loses nothing: every step is kept
-//! ([`Kept`]), and the same command goes on from there to the same answer.
+//! One search over clips: by least squares or without slopes, with a bar, and so that Ctrl-C loses nothing: every step is kept,
+//! and the same command goes on from there to the same answer.
 
 use super::error::IdentifyError;
-use super::options::Options;
+use super::options::{Optimizer, Options};
+use super::work::{Work, stopped};
 use inference::estimate::search;
 use inference::estimate::{
     ClipModel, Evolution, Fit, Found, Impossible, Place, Random, Schedule, Search, Swarm, Underway, Unknown, begin,
     fit_from, go_on, minimise,
 };
 use inference::interrupt::Interrupt;
-use inference::kept::{Fingerprint, Kept};
+use inference::kept::Fingerprint;
 use shared_mem::progress::Progress;
-use shared_mem::typed;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// Ways of searching.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Optimizer {
-    /// Bounded least squares on rollouts.
-    #[default]
-    LeastSquares,
-    /// A particle swarm.
-    Swarm,
-    /// Covariance matrix adaptation.
-    Evolution,
-}
-
-impl Optimizer {
-    /// Name on command lines and in answers.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::LeastSquares => "least-squares",
-            Self::Swarm => "pso",
-            Self::Evolution => "cma",
-        }
-    }
-}
 
 /// Most steps with some of the clips, before all are fitted (a choice).
 const STEPS_OF_THE_ROUGH_FIT: usize = 3;
@@ -170,25 +147,6 @@ impl Run<'_> {
         }
         sum / rows.max(1) as f64
     }
-}
-
-/// Where the steps of long work are kept, and what cuts it short.
-#[derive(Clone, Copy)]
-pub(super) struct Work<'a> {
-    pub(super) kept: &'a Kept,
-    pub(super) interrupt: &'a Interrupt,
-}
-
-impl<'a> Work<'a> {
-    /// Of which nothing is kept.
-    pub(super) fn passing(interrupt: &'a Interrupt) -> Self {
-        Self { kept: Kept::nothing(), interrupt }
-    }
-}
-
-/// Whether the user asked for the end: then what was found so far is taken to its file.
-pub(super) fn stopped(Work { kept, interrupt }: Work<'_>) -> Result<(), IdentifyError> {
-    if interrupt.asked() { Err(IdentifyError::Interrupted(kept.farewell(&typed::command()))) } else { Ok(()) }
 }
 
 /// The bar and the interruption of a search.

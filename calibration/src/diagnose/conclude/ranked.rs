@@ -103,9 +103,7 @@ impl<E: Evidence> DrawnFrom<'_, E> {
         Candidate {
             effect: name.into(),
             probability: if kept { probability.max(finding.confidence) } else { probability },
-            parameters: fit
-                .map(|fit| parameters::of_effect_moved(bench, fit, effect, time_step))
-                .unwrap_or_default(),
+            parameters: fit.map(|fit| parameters::of_effect_moved(bench, fit, effect, time_step)).unwrap_or_default(),
             shrink,
             confusable_with: confusable(case, &found.steps[0], effect, measures.overdispersion[0]),
             status,

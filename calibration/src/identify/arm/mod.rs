@@ -19,8 +19,9 @@ mod verdict;
 use super::error::IdentifyError;
 use super::finding::Finding;
 pub use super::options::Options;
-use super::run::{Outcome, Run, Work};
+use super::run::{Outcome, Run};
 use super::used::Used;
+use super::work::{Work, answered};
 use crate::answer::identification::Identification;
 use inference::controller::{controlled, start};
 use inference::estimate::interval::LEVEL;
@@ -77,7 +78,7 @@ fn identify_material(
     }
     let given = options.given()?;
     let question = options.question("arm", given.as_ref(), &material.cell, &material.clips);
-    options.answered("arm", &question, interrupt, |work| identify_kept(material, given, options, work))
+    answered(options, "arm", &question, interrupt, |work| identify_kept(material, given, options, work))
 }
 
 /// The answer, and the parameters that are written.

@@ -3,7 +3,7 @@
 use super::Model;
 use crate::answer::identification::{Advice, NotIdentifiable};
 use crate::identify::finding::{Finding, OPEN_FROM_SHARE_OF_VALUE};
-use crate::identify::run::Optimizer;
+use crate::identify::options::Optimizer;
 use crate::identify::used::Used;
 use inference::likelihood::Setting;
 use inference::statistics::extent;

@@ -7,7 +7,7 @@ use crate::answer::Trace;
 use crate::answer::identification::{ClipGap, Clips, Figures, Gap, Identification, NotIdentifiable, Parameter};
 use crate::identify::figures::USE_FITTED;
 use crate::identify::finding::rows;
-use crate::identify::run::Optimizer;
+use crate::identify::options::Optimizer;
 use inference::admit::remarks::grouped;
 use inference::estimate::ClipFit;
 use std::collections::BTreeMap;

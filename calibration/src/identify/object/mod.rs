@@ -26,7 +26,9 @@ mod vicinity;
 
 use super::error::IdentifyError;
 pub use super::options::Options;
-use super::run::{Optimizer, Outcome, Run, Work};
+use super::options::Optimizer;
+use super::run::{Outcome, Run};
+use super::work::{Work, answered};
 use crate::answer::identification::Identification;
 use inference::controller;
 use inference::estimate::Unknown;
@@ -78,7 +80,7 @@ fn identify_material(
         engine.admits(clips())?;
     }
     let question = options.question("object", options.given()?.as_ref(), &material.cell, clips());
-    options.answered("object", &question, interrupt, |work| identify_kept(material, options, work))
+    answered(options, "object", &question, interrupt, |work| identify_kept(material, options, work))
 }
 
 /// The answer, and the parameters that are written.

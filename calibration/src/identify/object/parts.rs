@@ -6,7 +6,7 @@
 use super::Problem;
 use super::polish::let_go;
 use crate::identify::error::IdentifyError;
-use crate::identify::run::Work;
+use crate::identify::work::Work;
 use inference::estimate::ClipModel as _;
 use inference::estimate::interval::LEVEL;
 use inference::likelihood::object::ObjectClips;
