@@ -219,6 +219,6 @@ mod tests {
     fn numbers_that_fit_some_clips_alone_are_named() {
         assert!(carried_over(&NO_ANSWER).contains("more than doubles"));
         assert_eq!(carried_over(&Share { value: -0.4, ci90: [-0.6, 0.1] }), "");
-        assert_eq!(carried_over(&NOT_FITTED), "");
+        assert_eq!(carried_over(&Share::default()), "");
     }
 }
