@@ -12,7 +12,7 @@ const READ: [&str; 4] =
 const NOT_YET: &[&str] = &[];
 
 /// Numeric constants of `diagnose`: no more than there are today.
-const MOST_NUMBERS_OF_DIAGNOSE: usize = 120;
+const MOST_NUMBERS_OF_DIAGNOSE: usize = 119;
 
 /// The constants of every file below a folder that is no test, with its name.
 fn by_file(folder: &str) -> Vec<(String, Vec<Constant>)> {

@@ -12,7 +12,7 @@ use super::turned::Side;
 use crate::answer::diagnosis::{Clips, Kind, SensorGap, Share, Status};
 use crate::diagnose::conclude::advice;
 use crate::diagnose::conclude::site::{Advice, Site};
-use crate::diagnose::criteria::{CLASS_IS_RIGHT, UNKNOWN_IS_RIGHT};
+use crate::diagnose::criteria::{CLASS_IS_RIGHT, MOST_OF_IT, UNKNOWN_IS_RIGHT};
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 use crate::diagnose::judge::gap::Residuals;
@@ -23,9 +23,6 @@ use crate::diagnose::work::{DiagnoseError, Options};
 use inference::likelihood::{Evidence, Setting};
 use shared_mem::recording::Session;
 use std::collections::BTreeMap;
-
-/// B deviates where it leaves more than this many times what A leaves under its own model.
-const MIN_TIMES_OF_A: f64 = 2.0;
 
 /// What a conclusion is drawn from.
 pub(super) struct Case<'a> {
@@ -114,15 +111,15 @@ fn of_a<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> f64 {
 }
 
 /// How many times as much B leaves although both share everything as A does under its own model, in a clip like most; `None`
-/// where that is not plainly more.
+/// where A leaves most of it as well.
 fn deviates<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Option<f64> {
     let (of_b, of_a): (Vec<usize>, Vec<usize>) =
         pair_bench.split.open().into_iter().partition(|clip| pair_bench.is_of_b(*clip));
     let b = pair_bench.left(case.found.without.model.of(Side::B), &of_b)?;
     let a = pair_bench.left(&case.of_a.full, &of_a)?;
     let groups = SensorGap::of_groups(&b.typical(), &a.typical());
-    let more = groups.iter().filter(|left| left.gaps() > 1.0).map(|left| left.before / left.after);
-    more.filter(|times| *times > MIN_TIMES_OF_A).max_by(f64::total_cmp)
+    let more = groups.iter().filter(|left| left.gaps() > 1.0 && left.after < MOST_OF_IT * left.before);
+    more.map(|left| left.before / left.after).max_by(f64::total_cmp)
 }
 
 /// Subjects that do as well as one that changed, beside all the others that did.
@@ -197,23 +194,13 @@ fn candidates<E: Evidence>(
             smallest_seen: smallest,
         }
     };
-    let mut all: Vec<Candidate> = case.subjects.iter().enumerate().map(one).collect();
-    let place = |candidate: &Candidate| {
-        let index = case
-            .subjects
-            .iter()
-            .position(|subject| subject.name == candidate.name && subject.effect.is_some() == candidate.is_effect);
-        first.scores.iter().position(|score| Some(score.subject) == index).unwrap_or(usize::MAX)
-    };
-    all.sort_by_key(|candidate| {
-        (
-            candidate.status != Status::Named,
-            candidate.status != Status::Possible,
-            candidate.status == Status::NotTestable,
-            place(candidate),
-        )
+    let place = |index: usize| first.scores.iter().position(|score| score.subject == index).unwrap_or(usize::MAX);
+    let all = case.subjects.iter().enumerate().map(|(index, subject)| (place(index), one((index, subject))));
+    let mut all: Vec<(usize, Candidate)> = all.collect();
+    all.sort_by_key(|(place, Candidate { status, .. })| {
+        (*status != Status::Named, *status != Status::Possible, *status == Status::NotTestable, *place)
     });
-    all
+    all.into_iter().map(|(_, candidate)| candidate).collect()
 }
 
 /// How likely each change is that was proven: shares of the evidence in the step in which it was.
