@@ -68,8 +68,9 @@ impl Slopes {
             let is_in = |numbers: &[usize]| numbers.iter().any(|number| free.contains(number));
             let probed: Vec<usize> =
                 candidates.filter(|(_, info)| !is_in(&info.turned)).map(|(candidate, _)| candidate).collect();
-            let train = pair_bench.split.train.iter().filter(|clip| side_of(**clip, pair_bench.first_of_b) == side);
-            let clips: Vec<_> = train.map(|clip| (*clip, fitted.own(*clip, bench.scatter.count()))).collect();
+            let train = pair_bench.split.train.iter().copied();
+            let of_side: Vec<usize> = train.filter(|clip| side_of(*clip, pair_bench.first_of_b) == side).collect();
+            let clips = bench.with_own(&of_side, Some(fitted));
             let (full, free) = (model.of(side), &free[..]);
             let point = Point { full, free, probed: &probed, clips: &clips, precision: Precision::Joints };
             sweep(bench.evidence, bench.library, &point, &bench.scatter, &|_| !bench.interrupt.asked()).ok()

@@ -98,6 +98,11 @@ impl<V> Hypothesis<V> {
         self.fitted.iter().map(|fitted| fitted.clip).collect()
     }
 
+    /// The same, each with its nuisance parameters.
+    pub(in crate::diagnose) fn clips_with_own(&self) -> Clips {
+        self.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect()
+    }
+
     /// `-2 ln` of the likelihood of the clips it was fitted to.
     pub fn deviance(&self) -> f64 {
         self.fitted.iter().map(FittedClip::deviance).sum()
@@ -160,12 +165,17 @@ impl<E: Likelihood> Bench<'_, E> {
         near: Option<&Hypothesis<E::Own>>,
         effort: Effort,
     ) -> Option<Hypothesis<E::Own>> {
-        let count = self.scatter.count();
-        let own = |clip: &usize| (*clip, near.map_or_else(|| vec![0.0; count], |near| near.own(*clip, count)));
-        let from: Clips = clips.iter().map(own).collect();
+        let from = self.with_own(clips, near);
         let step = self.step("fit").with(&(effects, clips, effort)).with_numbers(&full).with_numbers(weights);
         let step = step.with_numbers(from.iter().flat_map(|(_, own)| own));
         self.trail.0.once(&step, || self.fitted(effects, full, from, weights, effort))
+    }
+
+    /// Clips with their nuisance parameters as a hypothesis has them, else at rest.
+    pub(in crate::diagnose) fn with_own(&self, clips: &[usize], near: Option<&Hypothesis<E::Own>>) -> Clips {
+        let count = self.scatter.count();
+        let own = |clip: usize| near.map_or_else(|| vec![0.0; count], |near| near.own(clip, count));
+        clips.iter().map(|clip| (*clip, own(*clip))).collect()
     }
 
     /// A step of this bench by its name.
@@ -261,9 +271,7 @@ impl<E: Likelihood> Bench<'_, E> {
         clips: &[usize],
         weights: &[f64],
     ) -> Option<Vec<FittedClip<E::Own>>> {
-        let nothing = vec![0.0; self.scatter.count()];
-        let clips = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
-        let at = self.profiled(&hypothesis.full, clips, weights)?;
+        let at = self.profiled(&hypothesis.full, self.with_own(clips, None), weights)?;
         let at = self.restarted(&hypothesis.full, at, weights);
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
         let forms = swept.reduced(self.evidence, weights).ok()?;

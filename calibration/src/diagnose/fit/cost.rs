@@ -33,8 +33,7 @@ impl<E: Likelihood> Bench<'_, E> {
 
     /// [`Self::plain_cost`] where it is less than `bound`; clips are not asked any more once it is not.
     pub fn plain_cost_below(&self, clips: &[usize], full: &[f64], weights: &[f64], bound: f64) -> Option<f64> {
-        let nothing = vec![0.0; self.scatter.count()];
-        let clips: Vec<_> = clips.iter().map(|clip| (*clip, nothing.clone())).collect();
+        let clips = self.with_own(clips, None);
         let mut sum = 0.0;
         for some in clips.chunks(rayon::current_num_threads()) {
             for cost in self.costs(full, some, weights)? {

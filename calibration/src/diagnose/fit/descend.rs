@@ -11,7 +11,7 @@ use super::sweep::{Precision, Swept};
 use inference::estimate::Impossible;
 use inference::estimate::solve::{Descent, Problem, Quadratic, Schedule, Trial, descend};
 use inference::likelihood::Likelihood;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// A fit has converged when a step promises less than 0.05 of the deviance: a fiftieth of a nat decides nothing. Where more is left
 /// than the weights take for noise, chance moves more, and so much more decides nothing.
@@ -52,10 +52,7 @@ impl<E: Likelihood> Bench<'_, E> {
         }
         let left: Vec<(usize, Vec<f64>)> =
             at.clips.iter().map(|clip| (clip.clip, clip.matrix.column(0).iter().copied().collect())).collect();
-        let found = floor::weights(self.evidence, &left);
-        let counts = weights.iter().zip(&found).filter(|(taken, found)| **taken > 0.0 && **found > 0.0);
-        let ratios: Vec<f64> = counts.map(|(taken, found)| (taken / found).powi(2)).collect();
-        (ratios.iter().sum::<f64>() / ratios.len().max(1) as f64).max(1.0)
+        floor::overdispersion(weights, &floor::weights(self.evidence, &left))
     }
 }
 
@@ -77,8 +74,7 @@ impl<E: Likelihood> Problem for Moving<'_, E> {
 
     fn quadratic(&self, place: &Reached, at: &Swept) -> Result<Quadratic, Impossible> {
         let free = self.moving.len();
-        let forms = at.reduced(self.bench.evidence, self.weights)?;
-        let sum = forms.iter().fold(DMatrix::zeros(1 + free, 1 + free), |sum, reduced| sum + &reduced.form);
+        let sum = at.total(self.bench.evidence, self.weights)?;
         let room = self.moving.iter().map(|k| self.bench.library.unknowns[*k].reach(place.full[*k]));
         Ok(Quadratic {
             cost: self.bench.cost(&place.full, &place.clips, self.weights).ok_or_else(no_answer)?,

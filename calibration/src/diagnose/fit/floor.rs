@@ -12,7 +12,7 @@ use inference::estimate::quadratic::minimum;
 use inference::likelihood::arm::noise::correlation_length;
 use inference::likelihood::{Channel, Group, Likelihood};
 use inference::statistics::median;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any
 /// engine is off there by many times their noise.
@@ -51,6 +51,14 @@ fn weight(evidence: &impl Likelihood, clips: &[(usize, Vec<f64>)], channel: usiz
     (power * length).sqrt().recip()
 }
 
+/// How many times what is left exceeds what weights take for noise, at least 1: the mean over the channels that count of how many times
+/// larger its square is. `found`: the weights of what is left.
+pub fn overdispersion(taken: &[f64], found: &[f64]) -> f64 {
+    let counts = taken.iter().zip(found).filter(|(taken, found)| **taken > 0.0 && **found > 0.0);
+    let ratios: Vec<f64> = counts.map(|(taken, found)| (taken / found).powi(2)).collect();
+    (ratios.iter().sum::<f64>() / ratios.len().max(1) as f64).max(1.0)
+}
+
 /// What the richest hypothesis leaves: all numbers and every candidate's best form at once, each clip's nuisance parameters at
 /// their best.
 ///
@@ -62,9 +70,7 @@ pub fn richest_residuals(
     library: &Library,
     weights: &[f64],
 ) -> Result<Vec<(usize, Vec<f64>)>, Impossible> {
-    let reduced = swept.reduced(evidence, weights)?;
-    let size = 1 + swept.columns.len();
-    let mut sum = reduced.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
+    let mut sum = swept.total(evidence, weights)?;
     shortlist::hold_numbers(&mut sum, &swept.columns, library);
     let scored = shortlist::score(swept, &sum, library);
     let in_best = |column: &Column| match column {

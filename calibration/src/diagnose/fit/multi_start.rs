@@ -81,8 +81,7 @@ impl<E: Likelihood> Bench<'_, E> {
         moving: &[usize],
         weights: &[f64],
     ) -> Option<Tried> {
-        let clips = from.fitted.iter().map(|fitted| (fitted.clip, fitted.own.clone())).collect();
-        let (Reached { full, clips, .. }, _) = self.descended(full, clips, moving, weights, PROBE)?;
+        let (Reached { full, clips, .. }, _) = self.descended(full, from.clips_with_own(), moving, weights, PROBE)?;
         Some(Tried { cost: self.cost(&full, &clips, weights)?, numbers: full })
     }
 }

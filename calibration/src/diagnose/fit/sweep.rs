@@ -265,6 +265,16 @@ impl Swept {
         self.clips.par_iter().map(|clip| self.reduce(clip, evidence, weights)).collect()
     }
 
+    /// The sum of the clips' forms.
+    ///
+    /// # Errors
+    /// As of [`Self::reduced`].
+    pub fn total(&self, evidence: &impl Likelihood, weights: &[f64]) -> Result<DMatrix<f64>, Impossible> {
+        let size = 1 + self.columns.len();
+        let forms = self.reduced(evidence, weights)?;
+        Ok(forms.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form))
+    }
+
     fn reduce(&self, clip: &SweptClip, evidence: &impl Likelihood, weights: &[f64]) -> Result<Reduced, Impossible> {
         let gram = gram(clip, evidence, weights);
         // The residual and the clip's nuisance parameters, without the columns between them.

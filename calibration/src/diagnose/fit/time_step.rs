@@ -13,7 +13,7 @@ use nalgebra::DVector;
 /// How far each free number of a hypothesis would move; `None` where clips cannot be integrated in other steps, as those with an
 /// object. `weights`: those that it was fitted with.
 pub fn error<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
-    let clips: Vec<(usize, Vec<f64>)> = hypothesis.fitted.iter().map(|clip| (clip.clip, clip.own.clone())).collect();
+    let clips = hypothesis.clips_with_own();
     // Asked first: where there is no answer nothing need be linearised.
     let halves: Vec<Vec<f64>> =
         clips.iter().map(|(clip, _)| bench.evidence.in_halves(*clip, &hypothesis.full)).collect::<Option<_>>()?;

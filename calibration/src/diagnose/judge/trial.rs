@@ -103,15 +103,10 @@ impl Found {
     /// 1: so many times less do differences between candidates say. Weights come from slopes, with all candidates at once; a
     /// real arm deviates far more under all that is named. Clips with nuisance parameters take that up.
     pub fn overdispersion<E: Evidence>(&self, bench: &Bench<'_, E>) -> Vec<f64> {
-        let clips: Vec<usize> = self.last.fitted.iter().map(|clip| clip.clip).collect();
-        let left = (bench.scatter.count() == 0).then(|| Residuals::at(bench, &self.last, &clips)).flatten();
+        let left = (bench.scatter.count() == 0).then(|| Residuals::at(bench, &self.last, &self.last.clips())).flatten();
         let Some(left) = left else { return vec![1.0; self.steps.len()] };
         let weights = floor::weights(bench.evidence, &left.clips);
-        let exceeds = |step: &Step| {
-            let ratios = step.weights.iter().zip(&weights).map(|(taken, found)| (taken / found).powi(2));
-            (ratios.sum::<f64>() / weights.len() as f64).max(1.0)
-        };
-        self.steps.iter().map(exceeds).collect()
+        self.steps.iter().map(|step| floor::overdispersion(&step.weights, &weights)).collect()
     }
 
     /// The effects that were kept, each with the step in which it was added.

@@ -6,7 +6,6 @@ use crate::diagnose::fit::sweep::{Point, Precision, Swept, sweep};
 use crate::diagnose::fit::{floor, stages};
 use inference::admit::Split;
 use inference::likelihood::{Evidence, random_effects_scale};
-use nalgebra::DMatrix;
 use shared_mem::progress::Progress;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -30,9 +29,7 @@ fn taken<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, ba
     let mut swept = swept(bench, split, from, bar)?;
     let weights = weights(bench, &[&swept])?;
     let scores = |swept: &Swept| {
-        let size = 1 + swept.columns.len();
-        let forms = swept.reduced(bench.evidence, &weights).ok()?;
-        let sum = forms.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form);
+        let sum = swept.total(bench.evidence, &weights).ok()?;
         Some(shortlist::score(swept, &sum, bench.library))
     };
     let scored = scores(&swept)?;
@@ -55,8 +52,7 @@ pub(in crate::diagnose) fn weights<E: Evidence>(bench: &Bench<'_, E>, sweeps: &[
 }
 
 fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Swept> {
-    let count = bench.scatter.count();
-    let clips: Vec<(usize, Vec<f64>)> = split.train.iter().map(|clip| (*clip, from.own(*clip, count))).collect();
+    let clips = bench.with_own(&split.train, Some(from));
     let probed: Vec<usize> = (0..bench.library.candidates.len()).filter(|k| !from.effects.contains(k)).collect();
     let point =
         Point { full: &from.full, free: &from.free, probed: &probed, clips: &clips, precision: Precision::Joints };
