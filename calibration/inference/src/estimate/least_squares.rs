@@ -243,7 +243,7 @@ impl<M: ClipModel, W: Fn(&Underway<&Fit>) -> bool> Problem for AllClips<'_, M, W
         at.clips.iter().map(gain).sum()
     }
 
-    fn stepped(&mut self, from: &Place, at: &Fit, Trial { number, step }: Trial<'_>) -> Option<(Place, f64)> {
+    fn stepped(&mut self, from: &Place, at: &Fit, Trial { number, step, .. }: Trial<'_>) -> Option<(Place, f64)> {
         let held = if self.unknowns.is_empty() { 0 } else { TRIALS_OF_SHARED_ALONE };
         let share = 0.5_f64.powi(i32::try_from(number.saturating_sub(held)).unwrap_or(i32::MAX));
         let own = at.clips.iter().map(|clip| clip.own_part_way(step, share)).collect();

@@ -71,6 +71,8 @@ impl Quadratic {
 pub struct Trial<'a> {
     pub number: usize,
     pub step: &'a DVector<f64>,
+    /// What costs as much is not taken, and need not be worked out to the end.
+    pub below: f64,
 }
 
 /// What is fitted.
@@ -196,7 +198,7 @@ fn step<P: Problem>(
             if promised < enough {
                 return if number == 0 { Tried::TooLittle } else { Tried::NoneDown };
             }
-            let there = problem.stepped(place, slopes, Trial { number, step: &step });
+            let there = problem.stepped(place, slopes, Trial { number, step: &step, below: around.cost });
             if let Some((place, cost)) = there.filter(|(_, cost)| *cost < around.cost) {
                 *damping = (*damping * DAMPING_DOWN).max(MIN_DAMPING);
                 return Tried::Down { place, brought: (around.cost - cost) / promised };

@@ -98,7 +98,7 @@ impl<E: Likelihood> Problem for Moving<'_, E> {
             Some((clip.clip, at.own_after(clip, bench.evidence, weights, trial.step).ok()?))
         };
         let clips = bench.profiled(&full, at.clips.iter().map(own).collect::<Option<_>>()?, weights)?;
-        let clips = bench.restarted(&full, clips, weights);
+        let clips = bench.restarted_below(&full, clips, weights, trial.below);
         let cost = bench.cost(&full, &clips, weights)?;
         let turned_round = full != straight;
         Some((Reached { full, clips, turned_round }, cost))

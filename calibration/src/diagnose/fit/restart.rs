@@ -22,12 +22,23 @@ const KEPT_SHARES: [f64; 2] = [0.5, 1.0];
 
 impl<E: Likelihood> Bench<'_, E> {
     /// Clips with their nuisance parameters, those that stand out where they cost least; those without an answer as they were.
-    pub(in crate::diagnose) fn restarted(&self, full: &[f64], mut clips: Clips, weights: &[f64]) -> Clips {
+    pub(in crate::diagnose) fn restarted(&self, full: &[f64], clips: Clips, weights: &[f64]) -> Clips {
+        self.restarted_below(full, clips, weights, f64::INFINITY)
+    }
+
+    /// The same where they may cost less than `below` then; as they were where they do not.
+    pub(super) fn restarted_below(&self, full: &[f64], mut clips: Clips, weights: &[f64], below: f64) -> Clips {
         if self.scatter.count() == self.scatter.heavy.len() {
             return clips;
         }
         let Some(costs) = self.costs(full, &clips, weights) else { return clips };
-        for place in outstanding(&costs) {
+        let places = outstanding(&costs);
+        // No clip costs less than nothing, wherever it is restarted.
+        let others = costs.iter().enumerate().filter(|(place, _)| !places.contains(place)).map(|(_, cost)| cost);
+        if others.sum::<f64>() >= below {
+            return clips;
+        }
+        for place in places {
             let elsewhere = self.elsewhere(full, clips[place].0, weights).filter(|tried| tried.cost < costs[place]);
             if let Some(Tried { cost, numbers }) = elsewhere {
                 tracing::debug!("clip {} costs {cost:.0} elsewhere instead of {:.0}", clips[place].0, costs[place]);

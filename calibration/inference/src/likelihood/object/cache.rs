@@ -12,8 +12,9 @@ use twin::rollout::{CellTrace, Checkpoint};
 const APPROACHES: usize = 4;
 /// Hits kept for a clip [1]: a linearisation by as many numbers comes back to its point.
 const HITS: usize = 32;
-/// Whole runs kept for a clip [1]: a search asks again where it has just been, or with another clock.
-const OUTCOMES: usize = 12;
+/// Whole runs kept for a clip [1]: a search asks again where it has just been, or with another clock. A fit ends with the slopes of
+/// its last place, after trials and restarts from there that led nowhere.
+const OUTCOMES: usize = 32;
 
 /// All that counts until the tool touches the object.
 #[derive(Debug, Clone, PartialEq)]
