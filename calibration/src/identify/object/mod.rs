@@ -25,8 +25,8 @@ mod polish;
 mod vicinity;
 
 use super::error::IdentifyError;
-pub use super::options::Options;
 use super::options::Optimizer;
+pub use super::options::Options;
 use super::run::{Outcome, Run};
 use super::work::{Work, answered};
 use crate::answer::identification::Identification;
