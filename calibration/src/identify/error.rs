@@ -25,39 +25,28 @@ pub enum IdentifyError {
     Theta(#[from] TomlFileError),
     #[error(transparent)]
     Base(#[from] BaseError),
-    /// The arm's model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// What leads the arm.
     #[error(transparent)]
     Controller(#[from] ControllerError),
-    /// The object's mesh.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
-    /// The cell cannot be simulated.
     #[error(transparent)]
     Cell(#[from] SimError),
-    /// A clip cannot be replayed.
     #[error(transparent)]
     Replay(#[from] ReplayError),
     /// The engine cannot be asked for these clips.
     #[error(transparent)]
     Engine(#[from] EngineError),
-    /// There is no arm to identify.
     #[error("cell.toml has no {0} block; add it, or identify the object")]
     NoArm(&'static str),
-    /// There is no object to identify.
     #[error("cell.toml has no [object] block; add it, or identify the arm")]
     NoObject,
-    /// No such effect on an arm.
     #[error("--also {given}: no effect on the arm is called so; there are {known}")]
     Effect {
-        /// The name given.
         given: String,
-        /// The names there are.
         known: String,
     },
-    /// Nothing can be used.
     #[error("{session}: no clip can be used for the {target}: {why}")]
     NoClip {
         session: String,
@@ -88,7 +77,6 @@ pub enum IdentifyError {
     /// Ctrl-C. What was found is kept, and the words say where.
     #[error("{0}")]
     Interrupted(String),
-    /// The answer cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
 }

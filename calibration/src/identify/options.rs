@@ -43,7 +43,6 @@ pub struct Options {
     pub object: Option<String>,
     /// Effects on the arm whose parameters are searched besides.
     pub also: Vec<String>,
-    /// The way of searching.
     pub optimizer: Optimizer,
     /// Where the parameters go.
     pub out: Option<PathBuf>,

@@ -9,7 +9,6 @@ use shared_mem::recording::Clip;
 pub(super) struct Used {
     /// What is fitted, and what is held out ([`Split::confirm`]).
     pub(super) split: Split,
-    /// Their files.
     pub(super) clips: Clips,
 }
 

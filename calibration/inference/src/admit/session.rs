@@ -103,12 +103,10 @@ impl Admitted {
 /// Why a session cannot be diagnosed.
 #[derive(Debug, thiserror::Error)]
 pub enum Refused {
-    /// Nothing can be read.
     #[error(transparent)]
     Read(#[from] ReadError),
     #[error(transparent)]
     Arm(#[from] ModelError),
-    /// Torques cannot be predicted.
     #[error(
         "torques can be predicted from a model with masses alone: give cell.toml a [controller], and a `urdf` or `model` under [robot] in place of `joints`"
     )]

@@ -30,7 +30,6 @@ pub enum ControllerError {
     Base(#[from] BaseError),
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Not with these gains.
     #[error("the twin cannot be simulated: {0}; check the values of cell.toml and --parameters")]
     Impossible(#[from] Impossible),
 }

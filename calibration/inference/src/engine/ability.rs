@@ -58,7 +58,6 @@ pub struct Ability {
 }
 
 impl Ability {
-    /// From its own words.
     pub(super) fn read(hello: Hello) -> Result<Self, String> {
         let Hello { protocol, name, parameters, effects, readings, object } = hello;
         if !(OLDEST..=VERSION).contains(&protocol) {

@@ -41,7 +41,6 @@ pub(super) struct Asked {
     pub(super) most: usize,
 }
 
-/// A running process.
 #[derive(Debug)]
 pub(super) struct Process {
     command: String,

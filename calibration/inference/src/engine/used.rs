@@ -9,7 +9,6 @@ use twin::effects::registry;
 pub struct Used {
     /// Its name and version.
     pub name: String,
-    /// How it was called.
     pub command: String,
     /// Whether it simulated an object, too.
     pub object: bool,

@@ -30,7 +30,6 @@ pub(super) struct Shown<'a> {
     pub(super) left: &'a Residuals,
 }
 
-/// Draws the verdict.
 pub(super) fn decide<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Decided<'a> {
     let finding = finding(case, measures);
     let decision = finding.decide();
@@ -44,7 +43,6 @@ pub(super) fn decide<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -
 }
 
 impl Decided<'_> {
-    /// Whether effects are believed.
     fn believes(&self) -> bool {
         self.partly.is_some() || matches!(self.decision.kind, Kind::Named | Kind::Class)
     }

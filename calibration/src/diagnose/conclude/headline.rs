@@ -26,7 +26,6 @@ pub(super) struct Facts {
 /// An effect that closes a part of the gap, in too few clips to be proven.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct NotProven {
-    /// With its size.
     pub(super) effect: String,
     /// Share of the gap that it closes.
     pub(super) share: f64,

@@ -57,7 +57,6 @@ impl<E: Evidence> Case<'_, E> {
         &self.found.steps.last().unwrap_or(self.first()).weights
     }
 
-    /// Name of a candidate.
     fn name(&self, effect: usize) -> &'static str {
         self.bench.library.candidates[effect].effect.name
     }

@@ -19,7 +19,6 @@ pub(super) struct Judged<'a> {
     pub(super) place: usize,
     /// Effects that were in the twin then.
     pub(super) beside: &'a [&'a str],
-    /// What became of it.
     pub(super) status: Status,
     /// Whether it was not fitted because the arm's gap is open.
     pub(super) hidden: bool,

@@ -51,7 +51,6 @@ const INTERRUPTED: &str = "interrupted; it takes seconds, and the same command b
 /// A part that rests nearer than this to the end of its joint's range may lie on a stop, as a share of the range (a choice).
 const NEAR_A_STOP: f64 = 0.02;
 
-/// What to identify.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// The session's folder, or a clip beside a cell.toml.

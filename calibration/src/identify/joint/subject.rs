@@ -10,7 +10,6 @@ use twin::scene::start_of;
 /// A joint of an object that moves in itself.
 #[derive(Debug)]
 pub(super) struct Subject {
-    /// The object's name.
     pub(super) object: String,
     pub(super) joint: UrdfJoint,
     /// What moves on it, in its link's frame: the link, and what hangs on it where the simulated cell starts.

@@ -29,7 +29,6 @@ use std::time::Instant;
 /// What the comparison found. SI units.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Comparison {
-    /// The session's folder.
     pub session: String,
     /// Ways of searching, in the order of the table's columns.
     pub methods: Vec<Method>,
@@ -44,7 +43,6 @@ pub struct Comparison {
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Method {
     pub name: String,
-    /// What it found.
     pub parameters: BTreeMap<String, f64>,
     /// Clips simulated until it ended.
     pub evaluations: usize,
@@ -54,9 +52,7 @@ pub struct Method {
     pub loss_m: f64,
     /// Clips simulated and wall time [s] when its loss was first as low as the swarm's at last; none where it never was.
     pub to_target: Option<(usize, f64)>,
-    /// On clips held out.
     pub holdout: Figures,
-    /// On clips fitted.
     pub train: Figures,
     /// Clips held out, one by one: file, ADD, ADD-S [m].
     pub clips: Vec<(String, f64, f64)>,
