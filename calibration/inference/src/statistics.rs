@@ -1,6 +1,7 @@
-//! Quantiles of distributions and the extent of values, the one place of each; medians are those of [`shared_mem::statistics`].
+//! Quantiles of distributions and the extent of values, the one place of each; medians and what follows from them are those
+//! of [`shared_mem::statistics`].
 
-pub use shared_mem::statistics::median;
+pub use shared_mem::statistics::{median, robust_sigma};
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Normal, StudentsT};
 

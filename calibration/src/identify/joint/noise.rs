@@ -1,7 +1,7 @@
 //! How noisy recorded positions of a joint are, from the rows themselves: what changes from row to row, and what changes while the
 //! part rests.
 
-use inference::statistics::median;
+use inference::statistics::robust_sigma;
 
 /// Rows of a window in which a part may rest (a choice: half a second of a tracker).
 const ROWS_OF_A_WINDOW: usize = 30;
@@ -11,8 +11,6 @@ const SCATTER_AT_REST: f64 = 3.0;
 const DEGREE_OF_A_CURVE: usize = 3;
 /// Fewest windows of rest that say something (a choice).
 const FEWEST_WINDOWS: usize = 3;
-/// A median absolute deviation is so many standard deviations of a normal distribution.
-const MEDIAN_DEVIATION_OF_NORMAL: f64 = 0.674_49;
 /// Of the third difference of independent rows: the root of 1 + 9 + 9 + 1.
 const SIGMA_OF_A_THIRD_DIFFERENCE: f64 = 4.472_136;
 /// What lasts keeps at most this share from row to row (a choice).
@@ -32,8 +30,8 @@ pub(super) struct Noise {
 impl Noise {
     /// Of the positions of several clips.
     pub(super) fn of<'a>(clips: impl Iterator<Item = &'a [f64]> + Clone) -> Self {
-        let thirds = clips.clone().flat_map(|rows| rows.windows(4).map(|w| (w[3] - 3.0 * (w[2] - w[1]) - w[0]).abs()));
-        let white = median(thirds).unwrap_or(0.0) / MEDIAN_DEVIATION_OF_NORMAL / SIGMA_OF_A_THIRD_DIFFERENCE;
+        let thirds = clips.clone().flat_map(|rows| rows.windows(4).map(|w| w[3] - 3.0 * (w[2] - w[1]) - w[0]));
+        let white = robust_sigma(thirds).unwrap_or(0.0) / SIGMA_OF_A_THIRD_DIFFERENCE;
         let windows: Vec<&[f64]> = clips.flat_map(|rows| rows.chunks_exact(ROWS_OF_A_WINDOW)).collect();
         let of = |degree: usize| windows.iter().map(move |window| covariances(window, degree)).collect::<Vec<_>>();
         let resting: Vec<[f64; 3]> =
