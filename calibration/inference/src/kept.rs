@@ -140,6 +140,7 @@ impl Kept {
 
     /// What was kept of a step.
     pub fn known<T: DeserializeOwned>(&self, step: &Fingerprint) -> Option<T> {
+        // What cannot be read as this type is not this step's, and is worked out anew.
         self.results().by_step.get(&step.number()).and_then(|bytes| postcard::from_bytes(bytes).ok())
     }
 

@@ -130,12 +130,14 @@ impl Run<'_> {
             [simulated as f64, *best]
         };
         let convergence = so_far.iter().zip(&found.history).map(point).collect();
+        // No step: the clips linearised where the search ended, for the intervals.
         let fit = fit_from(&all, self.unknowns, self.random, best, &Schedule::of(0), |_, _| true)?;
         Ok(Outcome { fit, simulated: watch.simulated(), convergence, arrived: found.arrived })
     }
 
     /// Mean squared residual of all clips; the clips' nuisance parameters at zero.
     fn cost(&self, model: &impl ClipModel, shared: &[f64]) -> f64 {
+        // To eliminate them takes slopes, which this search does without.
         let own = vec![0.0; self.random.len()];
         let (mut sum, mut rows, mut out) = (0.0, 0, Vec::new());
         for clip in 0..model.clips() {

@@ -63,6 +63,7 @@ fn left_under(
     let base = begun(cell, &clips.iter().collect::<Vec<_>>(), &complete(cell, given)?, interrupt)?;
     match fitted(cell, None, &base, clips.to_vec(), interrupt) {
         Ok((_, fit)) if !fit.clips.is_empty() => Ok(Some(fit.misfit().sqrt())),
+        // An arm that flies away under a law is not led by it.
         Ok(_) | Err(ControllerError::Impossible(_)) => Ok(None),
         Err(error) => Err(error),
     }

@@ -86,6 +86,7 @@ fn of_clip(cell: &Cell, arm: &ArmModel, clip: &Clip) -> Option<Sums> {
     if measured.tau.is_empty() || measured.dof != dof || desired.dof != dof {
         return None;
     }
+    // One width for both, so that commands and measurements are smoothed alike.
     let half = half_width(&measured.stamps_ns)?.max(half_width(&desired.stamps_ns)?);
     let from = (*measured.stamps_ns.first()?).max(*desired.stamps_ns.first()?) + half;
     let to = (*measured.stamps_ns.last()?).min(*desired.stamps_ns.last()?).checked_sub(half)?;

@@ -46,6 +46,7 @@ pub fn controlled(
     remarks: &mut Vec<String>,
     interrupt: &Interrupt,
 ) -> Result<Cell, ControllerError> {
+    // The law first: what torque a spring makes is read by it.
     if let Some((led, remark)) = law::found(&cell, clips, given, interrupt)? {
         cell = led;
         remarks.push(remark);

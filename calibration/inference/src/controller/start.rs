@@ -44,6 +44,7 @@ pub fn improve<F: Fn(&[f64]) -> Theta + Sync>(
     if !ranged && !delayed {
         return;
     }
+    // Of what is not searched the grid holds the one value that changes nothing: a power of 0, a delay of 0.
     let powers: Vec<i32> = if ranged { GAIN_POWERS.collect() } else { vec![0] };
     let delays = if delayed { &DELAYS[..] } else { &DELAYS[..1] };
     let grid: Vec<(f64, i32)> = delays.iter().flat_map(|delay| powers.iter().map(|power| (*delay, *power))).collect();

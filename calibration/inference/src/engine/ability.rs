@@ -127,11 +127,13 @@ impl Ability {
             restore(centre_of_mass, &mut object.centre_of_mass, &nominal.centre_of_mass);
             restore(tip_friction, &mut object.tip_friction, &nominal.tip_friction);
         }
+        // What is left out here the twin adds as its own difference.
         part.effects = theta.effects.iter().filter_map(|effect| self.part_of(effect)).collect();
         part
     }
 
     fn part_of(&self, effect: &EffectTheta) -> Option<EffectTheta> {
+        // A camera's part acts on the answer, whoever simulated it.
         if find(&effect.name).is_some_and(|effect| effect.stage == Stage::Camera) {
             return Some(effect.clone());
         }

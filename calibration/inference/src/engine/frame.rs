@@ -46,6 +46,7 @@ pub(super) fn read(from: &mut impl Read, most: usize) -> Result<Frame, FrameErro
     let mut lengths = [0; 8];
     from.read_exact(&mut lengths).map_err(|_| FrameError::Ended)?;
     let [text, numbers] = [0, 4].map(|at| u32::from_le_bytes(std::array::from_fn(|k| lengths[at + k])));
+    // Letters of a program that prints to its output make lengths of this size; one that is only too long is a mistake in a message.
     if text > LONGEST_TEXT || numbers > MOST_NUMBERS {
         return Err(FrameError::NoMessage(lengths));
     }

@@ -243,6 +243,7 @@ impl Engine {
     fn states(&self, message: Vec<u8>, question: &Question<'_>) -> Result<Vec<f64>, NoStates> {
         self.asked.fetch_add(1, Ordering::Relaxed);
         self.with_object.fetch_or(question.object.is_some(), Ordering::Relaxed);
+        // The one that answered last; as many idle as were ever asked at once.
         let idle = locked(&self.idle).pop();
         let (rows, columns) = (question.times.len(), question.readings.len() * question.dof);
         let poses = question.object.map_or(0, |object| object.times.len());
@@ -331,6 +332,7 @@ fn greeted(call: &Call, greeting: &[u8], running: &Arc<Running>) -> Result<(Proc
 
 /// Kills every process of an engine once the user asked for the end; those that are waited for and those that nobody asks.
 fn kill_at_the_end(running: &Arc<Running>) {
+    // Weakly, so that the thread ends with the engine.
     let running = Arc::downgrade(running);
     std::thread::spawn(move || {
         while let Some(running) = running.upgrade() {

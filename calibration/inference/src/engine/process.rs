@@ -123,6 +123,7 @@ impl Process {
 
     /// Ends its input, and kills it where it does not end by that.
     fn end(&mut self) -> ExitStatus {
+        // The thread that serves it ends with its requests, and closes the pipe that it owns.
         self.requests = None;
         let began = Instant::now();
         while began.elapsed() < EXIT_TIMEOUT && !ending::asked() {

@@ -30,6 +30,7 @@ impl Recent {
     pub(super) fn keep(&mut self, key: u64, states: &Arc<Vec<f64>>) {
         self.numbers += states.len();
         self.kept.push_front((key, Arc::clone(states)));
+        // An answer that alone is more than all room goes at once.
         while self.numbers > MAX_KEPT_NUMBERS {
             let Some((_, given_up)) = self.kept.pop_back() else { return };
             self.numbers -= given_up.len();

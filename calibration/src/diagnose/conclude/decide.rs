@@ -116,6 +116,7 @@ fn stands_in<E: Evidence>(case: &Case<'_, E>, step: &Step, effect: usize, rival:
         return true;
     };
     let effects: Vec<usize> = last.effects.iter().map(|other| if *other == effect { rival } else { *other }).collect();
+    // The rival begins where its own trial ended, and the effect that it stands for is taken back.
     let mut full = last.full.clone();
     bench.library.candidates[effect].numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
     bench.library.candidates[rival].numbers.clone().for_each(|k| full[k] = fit.full[k]);

@@ -43,6 +43,7 @@ impl Shrunk {
             let percent = percent(self.mean).replace("> ", "more than ").replace("< ", "less than ");
             return format!("by {percent} on held-out clips");
         }
+        // Before and after the hit nothing may change where the cause acts in it alone.
         let of_contact = self.usual <= MIN_SHARE_CLOSED && self.contact > self.usual;
         let (share, whose) = if of_contact { (self.contact, "the joints in contact of ") } else { (self.usual, "") };
         format!("by {} in {whose}a held-out clip like most, but grows in {} of {all}", percent(share), all - shrinks)

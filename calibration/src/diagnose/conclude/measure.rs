@@ -42,6 +42,7 @@ pub(super) fn measure<E: Evidence>(case: &Case<'_, E>) -> Result<Measures, Diagn
     let weights = &case.first().weights[..];
     let without = on_confirm(case, &case.first().from, weights)?;
     let with = on_confirm(case, &found.last, case.last_weights())?;
+    // A clip like most is sought among all: of the few that confirm one alone would decide.
     let all: Vec<usize> = (0..admitted.clips.len()).collect();
     let typical = |hypothesis| {
         let left = Residuals::at(bench, hypothesis, &all).ok_or(DiagnoseError::NoBaseline)?;

@@ -148,6 +148,7 @@ fn not_proven<'a, E: Evidence>(
 fn clips(admitted: &Admitted, split: &Split) -> Clips {
     let files = |set: &[usize]| {
         let mut files: Vec<String> = set.iter().map(|clip| admitted.files[*clip].clone()).collect();
+        // Parts of one clip stand beside each other.
         files.dedup();
         files
     };

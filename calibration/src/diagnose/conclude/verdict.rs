@@ -78,6 +78,7 @@ impl Finding<'_> {
         if self.within_tolerance[0] {
             return self.none();
         }
+        // Rivals share what is sure: that one of them acts may be surer than each of them.
         let unlikely = self.rivals.is_empty() && self.confidence < LEAST_CONFIDENCE;
         if self.effects.is_empty() || !self.confirmed || unlikely {
             let gap = self.left.iter().any(|left| left.gaps() > 1.0);

@@ -99,6 +99,7 @@ fn errors(model: &Model<'_>, clip: usize, random: &[Random], numbers: &[f64]) ->
     for row in clip.averaged().flatten().copied() {
         times.push(seconds_between(measured.stamps_ns[0], measured.stamps_ns[row]));
         let pairs = measured.q_row(row).iter().zip(&predicted[row].state.q).enumerate();
+        // A reading that stands still says nothing of where its joint is.
         rows.push(pairs.map(|(joint, (q, p))| if clip.dead[joint] { 0.0 } else { q - p }).collect());
     }
     Ok(Errors { times, rows })

@@ -29,6 +29,7 @@ impl Found {
         let fit = best_fit(motions)?;
         // Neither is negative, and one that is found to be 0 is as uncertain as any other.
         let intervals = Intervals::new(&fit, &[false; 2], LEVEL);
+        // Rows that share their noise count as fewer, and what is left beyond noise counts as noise.
         let wider = (fit.misfit() * noise.lasts()).sqrt();
         let t = student(LEVEL, intervals.witnesses.saturating_sub(1));
         let rows: f64 = motions.iter().map(|motion| noise.independent(motion.times.len())).sum();

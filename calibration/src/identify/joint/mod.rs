@@ -138,6 +138,7 @@ impl OfClip {
         let joint = LoneJoint::new(&subject.joint, &subject.part, &clip.carrier);
         let motions = alone::motions(&clip, &joint, noise);
         let [low, high] = subject.joint.limits;
+        // What lies on a stop is held by that, whatever the friction.
         let edge = (NEAR_A_STOP * (high - low)).max(3.0 * noise.sigma);
         let free = alone::rests(&clip, noise).into_iter().filter(|at| (low + edge..high - edge).contains(at));
         let holds = free.map(|at| [joint.load(at).abs(), at]).max_by(|a, b| a[0].total_cmp(&b[0]));

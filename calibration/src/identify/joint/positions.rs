@@ -49,6 +49,7 @@ impl Positions {
             let mut position = joint_position(joint, &on, &pose);
             let off = (on * joint.pose_at(position)).inv_mul(&pose);
             if !joint.slides {
+                // A pose tells an angle but for whole turns: the one nearest to the row before, or to the middle of the range.
                 let near = positions.last().copied().unwrap_or(middle);
                 position += TAU * ((near - position) / TAU).round();
             }
@@ -62,6 +63,7 @@ impl Positions {
             let [a, b] = &subject.bodies;
             return Err(format!("has only {} poses of `{b}` while `{a}` is seen, too", positions.len()));
         }
+        // Medians: single poses of a tracker are anywhere.
         let [beside, turned] = [beside, turned].map(|values| median(values).unwrap_or(0.0));
         if beside > OFF_THE_JOINT || turned > TURNED_OFF_THE_JOINT {
             return Err(format!(

@@ -34,6 +34,7 @@ pub(super) fn disagreement(
     let (bar, mut answers) = (Progress::new("intervals", PARTS as u64), Vec::new());
     for part in 0..PARTS {
         bar.show(part as u64, "a part of the tosses by itself");
+        // Interleaved, so that what changes over a session is in all of them.
         let of_part = |clip: &usize| clip % PARTS == part;
         let own: Vec<Clip> = (0..clips.clips()).filter(of_part).map(|clip| clips.clip(clip).clone()).collect();
         let mut own = ObjectClips::new(clips.cell(), own, problem.settings.clone())?;
