@@ -42,21 +42,21 @@ pub(super) fn search<E: Evidence>(search: &Search<'_, E>, baseline: Hypothesis) 
 }
 
 /// A step, and how often it was begun anew.
-pub(in crate::diagnose) struct Tried {
+pub(in crate::diagnose) struct Attempt {
     step: Step,
     restarts: usize,
 }
 
 impl<E: Evidence> Selection for Search<'_, E> {
     type Model = Hypothesis;
-    type Step = Tried;
+    type Step = Attempt;
 
-    fn step(&self, now: &Hypothesis, before: &[Tried]) -> Option<(Tried, Option<Hypothesis>)> {
+    fn step(&self, now: &Hypothesis, before: &[Attempt]) -> Option<(Attempt, Option<Hypothesis>)> {
         let first = before.first().map(|tried| &tried.step);
         let before_that: usize = before.iter().map(|tried| tried.restarts).sum();
         let mut from = now.clone();
         for restarts in 0.. {
-            let ended = |step| (Tried { step, restarts }, None);
+            let ended = |step| (Attempt { step, restarts }, None);
             let around = Anchored::new(self.bench.evidence, &from.full);
             let bench = around.bench(self.bench);
             let near = &self.on(&bench);
@@ -73,7 +73,7 @@ impl<E: Evidence> Selection for Search<'_, E> {
             let Some(better) = better else {
                 let (step, extended) = extended(near, step, !before.is_empty())?;
                 let extended = extended.map(|fit| by_engine(self, fit, &step.weights));
-                return Some((Tried { step, restarts }, extended));
+                return Some((Attempt { step, restarts }, extended));
             };
             self.bar.insert(&stages::further());
             from = by_engine(self, better, &step.weights);
@@ -81,7 +81,7 @@ impl<E: Evidence> Selection for Search<'_, E> {
         None
     }
 
-    fn extends(tried: &Tried) -> &Hypothesis {
+    fn extends(tried: &Attempt) -> &Hypothesis {
         &tried.step.from
     }
 }
