@@ -55,8 +55,6 @@ pub struct CellClips<'a, F> {
     deviations: Vec<Vec<Vec<f64>>>,
     /// Index of the shared friction among the numbers.
     friction: Option<usize>,
-    /// Indices of the joints' stiffnesses among them.
-    stiffness: Vec<usize>,
     /// Index of the object's first channel.
     first: usize,
     /// For each clip the joints' residuals in contact.
@@ -109,10 +107,7 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             rows.push([of_arm, &poses, &joints.evidence(&object.rows(clip), in_contact)].concat());
             contact.push(joints);
         }
-        let numbers = || object.settings().settings().iter().enumerate();
-        let friction = numbers().find(|(_, setting)| **setting == Setting::Friction).map(|(k, _)| k);
-        let stiffness =
-            numbers().filter(|(_, setting)| matches!(setting, Setting::Stiffness(_))).map(|(k, _)| k).collect();
+        let friction = object.settings().settings().iter().position(|setting| *setting == Setting::Friction);
         let random_effects = object.random();
         let arm_alone = rows.iter().map(|_| Recent::default()).collect();
         let stepped_from = rows.iter().map(|_| Recent::default()).collect();
@@ -125,7 +120,6 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
             random_effects,
             deviations,
             friction,
-            stiffness,
             first,
             contact,
             arm_alone,
@@ -169,8 +163,8 @@ impl<'a, F: Fn(&[f64]) -> Theta + Sync> CellClips<'a, F> {
         {
             residuals.iter_mut().zip(&slopes[of_arm..]).for_each(|(residual, slope)| *residual += slope * value);
         }
-        let stiffness: Vec<f64> = self.stiffness.iter().map(|k| shared[*k]).collect();
-        residuals.extend(contact.in_sigmas(&joints, &stiffness));
+        let gains = self.object.settings().theta(&shared).arm;
+        residuals.extend(contact.in_sigmas(&joints, gains.as_ref().map_or(&[], |gains| &gains.stiffness)));
         Ok(residuals)
     }
 
