@@ -27,6 +27,24 @@ pub mod recent;
 pub mod rows;
 pub mod setting;
 pub mod smoothing;
+#[cfg(test)]
+mod test_arm_rows;
+#[cfg(test)]
+mod test_bench;
+#[cfg(test)]
+mod test_cell;
+#[cfg(test)]
+mod test_derivatives;
+#[cfg(test)]
+mod test_elimination;
+#[cfg(test)]
+mod test_random_effects;
+#[cfg(test)]
+mod test_servo;
+#[cfg(test)]
+mod test_setting;
+#[cfg(test)]
+mod test_smoothing;
 
 pub use rows::{Channel, Group, Row, StageName};
 pub use setting::{Setting, Settings};

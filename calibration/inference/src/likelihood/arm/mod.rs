@@ -24,6 +24,8 @@ pub mod noise;
 mod piece;
 mod regime;
 mod residuals;
+#[cfg(test)]
+mod test_noise;
 pub mod velocity;
 
 pub use clip::{ArmClip, ArmClipError};

@@ -352,4 +352,6 @@ fn difference(measured: &Isometry3<f64>, predicted: &Isometry3<f64>) -> [f64; 6]
 }
 
 #[cfg(test)]
+mod test_rows;
+#[cfg(test)]
 mod tests;

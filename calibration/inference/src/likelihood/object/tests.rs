@@ -2,68 +2,15 @@
 
 use super::*;
 use crate::likelihood::Setting;
-use crate::likelihood::setting::complete;
-use nalgebra::{UnitQuaternion, Vector3};
-use shared_mem::origin::Origins;
-use shared_mem::recording::{JointSeries, ObjectSeries};
-use std::path::Path;
-use twin::rollout::{CellTrace, Course, ObjectState};
-
-const NOISE: PoseNoise = PoseNoise { position: 5e-4, rotation: 3e-3 };
-/// What the cell is simulated with where it states no range.
-const FRICTION: f64 = 0.3;
-
-fn cell(noise: PoseNoise) -> Cell {
-    let text = format!(
-        "[table]\nheight = 0.0\n[object]\nshape = \"box\"\nsize = [0.08, 0.06, 0.05]\nmass = 0.3\n\
-         pose_noise = {{ position = {}, rotation = {} }}\n",
-        noise.position, noise.rotation
-    );
-    Cell::parse(&text, Path::new("cell.toml")).expect("a cell")
-}
-
-/// A box that slides and turns until it rests, seen at 100 Hz without noise.
-fn slide() -> Clip {
-    let pose = Isometry3::from_parts(
-        Vector3::new(0.4, 0.0, 0.025).into(),
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.7),
-    );
-    let state = ObjectState {
-        pose: Pose::from_isometry(pose),
-        velocity: Vector3::new(0.5, 0.2, 0.0),
-        angular_velocity: Vector3::z() * 0.8,
-    };
-    let stamps_ns: Vec<u64> = (0..60).map(|row| 1_000_000_000 + row * 10_000_000).collect();
-    let mut rollout = CellRollout::new(&cell(NOISE), None).expect("a cell");
-    rollout.start(stamps_ns[0], None, Some(&state), None);
-    let mut trace = CellTrace::default();
-    rollout.run(&Course { commands: None, joints_ns: &[], poses_ns: &stamps_ns }, &mut trace);
-    Clip {
-        file: "slide.mcap".into(),
-        kind: ClipKind::FreeMotion,
-        joint_names: Vec::new(),
-        desired: JointSeries::default(),
-        measured: JointSeries::default(),
-        torques_end_at_rows: false,
-        object: ObjectSeries { stamps_ns, poses: trace.poses },
-        others: Vec::new(),
-        origins: Origins::default(),
-        warnings: Vec::new(),
-        damage: None,
-    }
-}
+use crate::likelihood::test_bench::{FRICTION, NOISE, slide, slides};
 
 /// The slide under a friction that is searched.
 fn clips(noise: PoseNoise) -> ObjectClips {
-    let cell = cell(noise);
-    let settings = Settings::new(complete(&cell, None).expect("a cell"), vec![Setting::Friction]);
-    ObjectClips::new(&cell, vec![slide()], settings).expect("a cell that can be simulated")
+    slides(noise, vec![slide()], &[Setting::Friction])
 }
 
 fn residuals(clips: &ObjectClips, friction: f64, own: &[f64]) -> Vec<f64> {
-    let mut out = Vec::new();
-    clips.residuals(0, &[friction], own, &mut out).expect("it can be simulated");
-    out
+    crate::likelihood::test_bench::residuals(clips, 0, &[friction], own)
 }
 
 /// A nuisance parameter alone, by its place in the list.
