@@ -43,10 +43,7 @@ pub enum IdentifyError {
     #[error("cell.toml has no [object] block; add it, or identify the arm")]
     NoObject,
     #[error("--also {given}: no effect on the arm is called so; there are {known}")]
-    Effect {
-        given: String,
-        known: String,
-    },
+    Effect { given: String, known: String },
     #[error("{session}: no clip can be used for the {target}: {why}")]
     NoClip {
         session: String,
