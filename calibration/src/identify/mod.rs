@@ -21,7 +21,24 @@ pub mod object;
 mod options;
 mod run;
 #[cfg(test)]
+mod test_arm;
+#[cfg(test)]
 mod test_finding;
+#[cfg(test)]
+mod test_laws;
+#[cfg(test)]
+mod test_object;
+#[cfg(test)]
+#[path = "../../tests/pushes/mod.rs"]
+mod test_pushes;
+#[cfg(test)]
+mod test_refusals;
+#[cfg(test)]
+#[path = "../../inference/src/likelihood/test_servo.rs"]
+mod test_servo;
+#[cfg(test)]
+#[path = "../../tests/slides/mod.rs"]
+mod test_slides;
 mod used;
 mod work;
 

@@ -16,6 +16,8 @@ mod long_clips;
 mod measured_stiffness;
 mod object;
 mod objects_alone;
+#[path = "../pushes/mod.rs"]
+mod pushes;
 #[path = "../slides/mod.rs"]
 mod slides;
 mod torques;

@@ -6,6 +6,7 @@ use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::frames::Pose;
 use shared_mem::recording::{Clip, JointSeries, ObjectSeries, Session, SessionFiles};
 use shared_mem::theta::Theta;
+use std::ops::Range;
 use std::path::Path;
 use twin::rollout::{CellRollout, CellTrace, Course, ObjectState};
 
@@ -59,11 +60,16 @@ fn slide(cell: &Cell, hidden: &Theta, number: u64) -> Clip {
     }
 }
 
+/// Slides of these numbers in which `hidden` acts: each has a heading, a speed, a spin and a noise of its own.
+pub(crate) fn numbered(cell: &Cell, hidden: &str, numbers: Range<u64>) -> Vec<Clip> {
+    let hidden: Theta = shared_mem::toml_file::parse(hidden, Path::new("theta.toml")).expect("parameters");
+    numbers.map(|number| slide(cell, &hidden, number)).collect()
+}
+
 /// Slides in which `hidden` acts, read and admitted.
 pub(crate) fn session(hidden: &str) -> (Session, Admitted) {
     let cell = Cell::parse(CELL, Path::new("cell.toml")).expect("a cell");
-    let hidden: Theta = shared_mem::toml_file::parse(hidden, Path::new("theta.toml")).expect("parameters");
-    let clips: Vec<Clip> = (0..SLIDES).map(|number| slide(&cell, &hidden, number)).collect();
+    let clips = numbered(&cell, hidden, 0..SLIDES);
     let files = clips.iter().map(|clip| clip.file.display().to_string()).collect();
     let session = Session { folder: "slides".into(), cell, clips: Vec::new(), files: SessionFiles::default() };
     (session, Admitted::of(clips, files, true))

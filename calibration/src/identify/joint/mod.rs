@@ -23,6 +23,12 @@ mod noise;
 mod positions;
 mod subject;
 #[cfg(test)]
+mod test_answer;
+#[cfg(test)]
+mod test_motions;
+#[cfg(test)]
+mod test_positions;
+#[cfg(test)]
 mod tests;
 mod together;
 

@@ -15,7 +15,7 @@ use twin::world::LoneJoint;
 const RATE: f64 = 60.0;
 
 /// A joint along or about y, its part's centre of mass 0.1 m from it.
-fn joint(slides: bool, friction: f64, damping: f64) -> LoneJoint {
+pub(super) fn joint(slides: bool, friction: f64, damping: f64) -> LoneJoint {
     let limits = [-3.0, 3.0];
     let axis = Vector3::y_axis();
     let joint =
@@ -25,7 +25,7 @@ fn joint(slides: bool, friction: f64, damping: f64) -> LoneJoint {
 }
 
 /// Rests, is pushed up to a speed within a quarter of a second, is let go, and rests. A stop at `stop` holds it.
-fn pushed(joint: &LoneJoint, speed: f64, sigma: f64, stop: f64, seed: u64) -> Positions {
+pub(super) fn pushed(joint: &LoneJoint, speed: f64, sigma: f64, stop: f64, seed: u64) -> Positions {
     let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
     let (mut times, mut positions) = (Vec::new(), Vec::new());
     let (mut position, mut velocity) = (0.0, 0.0);
@@ -47,7 +47,7 @@ fn pushed(joint: &LoneJoint, speed: f64, sigma: f64, stop: f64, seed: u64) -> Po
     Positions { times, positions, carrier: UnitQuaternion::identity() }
 }
 
-fn motions(clips: &[Positions], joint: &LoneJoint) -> (Vec<Motion>, Noise) {
+pub(super) fn motions(clips: &[Positions], joint: &LoneJoint) -> (Vec<Motion>, Noise) {
     let noise = Noise::of(clips.iter().map(|clip| clip.positions.as_slice()));
     let mut all: Vec<Alone> = clips.iter().flat_map(|clip| alone::motions(clip, joint, &noise)).collect();
     cut_to_agree(&mut all, &noise);
@@ -55,7 +55,7 @@ fn motions(clips: &[Positions], joint: &LoneJoint) -> (Vec<Motion>, Noise) {
 }
 
 /// Three pushes of different strength.
-fn three(joint: &LoneJoint, sigma: f64, seed: u64) -> Vec<Positions> {
+pub(super) fn three(joint: &LoneJoint, sigma: f64, seed: u64) -> Vec<Positions> {
     [1.5, 2.5, 3.5]
         .iter()
         .enumerate()
