@@ -14,8 +14,6 @@ use nalgebra::{DMatrix, DVector};
 const DAMPING_DOWN: f64 = 0.1;
 /// Factor on it after one that did not [1]; a choice: few trials reach what is needed.
 const DAMPING_UP: f64 = 20.0;
-/// What it grows to at least [1]: less changes no step that matters; a choice.
-const LEAST_GROWN_DAMPING: f64 = 1e-3;
 /// Range of the damping [1]: rounding below, no step at all above.
 const MIN_DAMPING: f64 = 1e-9;
 const MAX_DAMPING: f64 = 1e12;
@@ -25,6 +23,8 @@ const MAX_DAMPING: f64 = 1e12;
 pub struct Schedule {
     /// Damping of the first trial, as a share of the information's diagonal [1].
     pub damping: f64,
+    /// What it grows to at least after a trial that did not lead down [1].
+    pub grown: f64,
     /// Most trials from one linearisation, with growing damping.
     pub trials: usize,
     /// Most steps.
@@ -36,9 +36,9 @@ pub struct Schedule {
 }
 
 impl Default for Schedule {
-    /// For clips whose residuals bend evenly, as those of an arm.
+    /// For clips whose residuals bend evenly, as those of an arm: damping below a thousandth changes no step that matters.
     fn default() -> Self {
-        Self { damping: 1e-6, trials: 12, iterations: 20, tolerance: 1e-3, secant: None }
+        Self { damping: 1e-6, grown: 1e-3, trials: 12, iterations: 20, tolerance: 1e-3, secant: None }
     }
 }
 
@@ -46,6 +46,12 @@ impl Schedule {
     /// The same with at most so many steps.
     pub fn of(iterations: usize) -> Self {
         Self { iterations, ..Self::default() }
+    }
+
+    /// The same where tools hit objects: trials cost roll-outs, and one that fails is seldom off by a little. Less damping than half of
+    /// the diagonal moves what the clips show well as far as before, a thousand times as much moves nothing (choices).
+    pub const fn over_hits(self) -> Self {
+        Self { grown: 0.5, trials: 4, ..self }
     }
 }
 
@@ -151,8 +157,8 @@ pub fn descend<P: Problem>(problem: &mut P, now: &mut Descent<P>, schedule: &Sch
         let around = problem.quadratic(&now.place, &slopes)?;
         let enough = schedule.tolerance * problem.excess(&slopes) - problem.promised_besides(&slopes);
         let mut damping = now.damping;
-        let trials = if kept { 1 } else { schedule.trials };
-        match step(problem, (&now.place, &slopes), &around, (&mut damping, enough, trials)) {
+        let tries = if kept { Schedule { trials: 1, ..*schedule } } else { *schedule };
+        match step(problem, (&now.place, &slopes), &around, (&mut damping, enough), &tries) {
             Tried::Down { place, brought } => {
                 steps += 1;
                 let before = std::mem::replace(&mut now.place, place);
@@ -187,10 +193,11 @@ fn step<P: Problem>(
     problem: &mut P,
     (place, slopes): (&P::Place, &P::Slopes),
     around: &Quadratic,
-    (damping, enough, trials): (&mut f64, f64, usize),
+    (damping, enough): (&mut f64, f64),
+    schedule: &Schedule,
 ) -> Tried<P::Place> {
     let mut number = 0;
-    while number < trials && *damping < MAX_DAMPING {
+    while number < schedule.trials && *damping < MAX_DAMPING {
         let step = bounded_step(&around.information, &around.gradient, &around.room, *damping);
         let promised = around.promised(&step);
         // A step that leads up where many parameters come to their bounds at once is damped, not tried.
@@ -205,7 +212,7 @@ fn step<P: Problem>(
             }
             number += 1;
         }
-        *damping = (*damping * DAMPING_UP).max(LEAST_GROWN_DAMPING);
+        *damping = (*damping * DAMPING_UP).max(schedule.grown);
     }
     Tried::NoneDown
 }
@@ -253,6 +260,14 @@ mod tests {
         let (Valley(tried), now, _) = from(0.1, &Schedule::of(1));
         assert!(tried.len() > 1 && tried.windows(2).all(|pair| pair[1] < pair[0]), "{tried:?}");
         assert!((now.place * now.place - 1.0).abs() < 0.99 && now.damping > MIN_DAMPING, "{}", now.place);
+    }
+
+    #[test]
+    fn after_a_trial_that_failed_the_damping_is_as_large_as_the_schedule_says() {
+        let tried = |grown| from(0.1, &Schedule { grown, ..Schedule::of(1) }).0.0;
+        let (little, much) = (tried(1e-3), tried(0.5));
+        assert!(little[0] == much[0] && much[1] < 0.8 * much[0] && little[1] > 0.99 * little[0], "{little:?} {much:?}");
+        assert!(much.len() < little.len(), "{little:?} {much:?}");
     }
 
     #[test]

@@ -41,9 +41,11 @@ pub struct Linearised {
 /// How much wider an interval may get by a look at the deviance [1] (a choice).
 const MAX_WIDENING: f64 = 6.0;
 /// How nuisance parameters come to their best.
-const PROFILE: Schedule = Schedule { damping: 1e-6, trials: 12, iterations: 2, tolerance: 0.3, secant: None };
+const PROFILE: Schedule =
+    Schedule { damping: 1e-6, grown: 1e-3, trials: 12, iterations: 2, tolerance: 0.3, secant: None };
 /// One step of the shared ones. Much damping: a hit is rough, and a whole step seldom leads down.
-const SHARED_STEP: Schedule = Schedule { damping: 1e-3, trials: 5, iterations: 1, tolerance: 0.3, secant: None };
+const SHARED_STEP: Schedule =
+    Schedule { damping: 1e-3, grown: 1e-3, trials: 5, iterations: 1, tolerance: 0.3, secant: None };
 /// A clip counts less from so many times the usual misfit on (a choice).
 const OUTLIER_MISFIT: f64 = 4.0;
 

@@ -7,15 +7,17 @@
 use super::bench::{Bench, Clips, Reached};
 use super::effort::Effort;
 use super::floor;
-use super::sweep::{Precision, Swept};
+use super::sweep::{Precision, Swept, SweptClip};
 use inference::estimate::Impossible;
 use inference::estimate::solve::{Descent, Problem, Quadratic, Schedule, Trial, descend};
 use inference::likelihood::Likelihood;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 /// A fit has converged when a step promises less than 0.05 of the deviance: a fiftieth of a nat decides nothing. Where more is left
 /// than the weights take for noise, chance moves more, and so much more decides nothing.
-const SCHEDULE: Schedule = Schedule { damping: 1e-4, trials: 6, iterations: 0, tolerance: 0.05, secant: Some(0.5) };
+const SCHEDULE: Schedule =
+    Schedule { damping: 1e-4, grown: 1e-3, trials: 6, iterations: 0, tolerance: 0.05, secant: Some(0.5) };
 
 /// A hypothesis of which some numbers move.
 struct Moving<'a, E> {
@@ -36,7 +38,8 @@ impl<E: Likelihood> Bench<'_, E> {
         weights: &[f64],
         effort: Effort,
     ) -> Option<(Reached, Option<Swept>)> {
-        let schedule = Schedule { iterations: effort.iterations, ..SCHEDULE };
+        let schedule = if self.evidence.has_object() { SCHEDULE.over_hits() } else { SCHEDULE };
+        let schedule = Schedule { iterations: effort.iterations, ..schedule };
         let mut hypothesis = Moving { bench: self, moving, weights, precision: effort.precision };
         let place = Reached { full, clips, turned_round: false };
         let mut way = Descent { place, slopes: None, damping: schedule.damping };
@@ -94,10 +97,11 @@ impl<E: Likelihood> Problem for Moving<'_, E> {
         self.moving.iter().zip(trial.step.iter()).for_each(|(k, step)| full[*k] += step);
         let straight = full.clone();
         bench.library.turn_round(&mut full);
-        let own = |clip: &super::sweep::SweptClip| {
-            Some((clip.clip, at.own_after(clip, bench.evidence, weights, trial.step).ok()?))
+        let own = |clip: &SweptClip| {
+            let ahead = at.own_after(clip, bench.evidence, weights, trial.step).ok()?;
+            Some((clip.clip, at.own_there(clip, ahead, bench.evidence, (&full, weights)).ok()?))
         };
-        let clips = bench.profiled(&full, at.clips.iter().map(own).collect::<Option<_>>()?, weights)?;
+        let clips = at.clips.par_iter().map(own).collect::<Option<_>>()?;
         let clips = bench.restarted_below(&full, clips, weights, trial.below);
         let cost = bench.cost(&full, &clips, weights)?;
         let turned_round = full != straight;

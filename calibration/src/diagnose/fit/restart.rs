@@ -148,6 +148,9 @@ mod tests {
         assert!((EDGE..=3.0 * SIGMA).contains(&friction), "no further than it must: {friction}");
         let changed: Vec<usize> = (0..5).filter(|place| restarted[*place] != rest[*place]).collect();
         assert_eq!(changed, [3]);
+        // The other four cost 1 each.
+        assert_eq!(bench.restarted_below(&full, rest.clone(), &[1.0], 4.0), rest, "a hopeless one is not");
+        assert_eq!(bench.restarted_below(&full, rest, &[1.0], 5.0), restarted);
     }
 
     #[test]

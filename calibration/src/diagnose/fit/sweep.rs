@@ -291,6 +291,27 @@ impl Swept {
         Eliminated::of(gram, &self.scatter.precision(&clip.own), &clip.own)
     }
 
+    /// A clip's nuisance parameters at their best for shared ones nearby, from `ahead` on by the slopes of here.
+    ///
+    /// # Errors
+    /// [`Impossible`] where the clip has no answer there, and as of [`Eliminated::of`].
+    pub(super) fn own_there(
+        &self,
+        clip: &SweptClip,
+        ahead: Vec<f64>,
+        evidence: &impl Likelihood,
+        (full, weights): (&[f64], &[f64]),
+    ) -> Result<Vec<f64>, Impossible> {
+        if self.scatter.count() == 0 {
+            return Ok(ahead);
+        }
+        let mut residuals = Vec::new();
+        evidence.residuals(clip.clip, full, &ahead, &mut residuals)?;
+        let mut there = SweptClip { own: ahead, ..clip.clone() };
+        there.matrix.set_column(0, &DVector::from_vec(residuals));
+        self.own_after(&there, evidence, weights, &DVector::zeros(self.columns.len()))
+    }
+
     /// A clip's nuisance parameters at their best for coefficients of all columns.
     ///
     /// # Errors
