@@ -1,7 +1,8 @@
 //! Whole sessions of pushes: what is answered of a hinge that is known, and what is said besides.
 
-use super::{JointError, Options, identify};
+use super::{Options, identify};
 use crate::answer::identification::Identification;
+use crate::identify::IdentifyError;
 use crate::identify::test_pushes::{DAMPING, FRICTION, session, session_of};
 use inference::interrupt::Interrupt;
 use std::path::Path;
@@ -98,7 +99,7 @@ fn one_push_is_said_to_be_one_and_nothing_is_held_out_of_it() {
 fn refusals_name_the_session_the_part_and_the_remedy() {
     let still = session(&[0.0]);
     let refused = identify(&options(still.path()), &Interrupt::default());
-    assert!(matches!(&refused, Err(JointError::NoMotion { part, .. }) if part == "laptop_lid"), "{refused:?}");
+    assert!(matches!(&refused, Err(IdentifyError::NoMotion { part, .. }) if part == "laptop_lid"), "{refused:?}");
     let folder = session(&[4.0]);
     let of = |change: &dyn Fn(&mut Options)| {
         let mut options = options(folder.path());
@@ -110,5 +111,5 @@ fn refusals_name_the_session_the_part_and_the_remedy() {
     assert!(of(&|options| options.session = "/nowhere".into()).contains("/nowhere"));
     let interrupt = Interrupt::default();
     interrupt.ask();
-    assert!(matches!(identify(&options(folder.path()), &interrupt), Err(JointError::Interrupted)));
+    assert!(matches!(identify(&options(folder.path()), &interrupt), Err(IdentifyError::Interrupted(_))));
 }
