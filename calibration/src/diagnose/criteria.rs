@@ -19,37 +19,41 @@ pub struct Criterion {
     pub value: f64,
 }
 
-const SQUARED_SIGMAS: &str = "squared sigmas";
-const SHARE: &str = "share";
+const UNIT_OF_EXCESS: &str = "squared sigmas";
+const UNIT_OF_SHARES: &str = "share";
 
 const fn criterion(name: &'static str, unit: &'static str, value: f64, meaning: &'static str) -> Criterion {
     Criterion { name, unit, meaning, value }
 }
 
 pub const JOINTS_EXCESS: Criterion =
-    criterion("joints_excess", SQUARED_SIGMAS, 0.6, "98 of 100 sessions with nothing wrong leave less in the joints");
+    criterion("joints_excess", UNIT_OF_EXCESS, 0.6, "98 of 100 sessions with nothing wrong leave less in the joints");
 pub const JOINTS_EXCESS_BESIDE_A_CAUSE: Criterion = criterion(
     "joints_excess_beside_a_cause",
-    SQUARED_SIGMAS,
+    UNIT_OF_EXCESS,
     6.0,
     "98 of 100 sessions leave less in the joints once their cause acts in the twin",
 );
 pub const OBJECT_EXCESS: Criterion = criterion(
     "object_excess",
-    SQUARED_SIGMAS,
+    UNIT_OF_EXCESS,
     14.0,
     "98 of 100 sessions with nothing wrong leave less in the object's poses",
 );
 pub const OBJECT_EXCESS_BESIDE_A_CAUSE: Criterion = criterion(
     "object_excess_beside_a_cause",
-    SQUARED_SIGMAS,
+    UNIT_OF_EXCESS,
     23.0,
     "98 of 100 sessions leave less in the object's poses once their cause acts in the twin",
 );
 pub const JOINTS_SHARE_LEFT: Criterion =
-    criterion("joints_share_left", SHARE, 0.03, "98 of 100 causes leave less of the joints' excess");
-pub const OBJECT_SHARE_LEFT: Criterion =
-    criterion("object_share_left", SHARE, 0.1, "98 of 100 causes leave less of the excess of the object's poses");
+    criterion("joints_share_left", UNIT_OF_SHARES, 0.03, "98 of 100 causes leave less of the joints' excess");
+pub const OBJECT_SHARE_LEFT: Criterion = criterion(
+    "object_share_left",
+    UNIT_OF_SHARES,
+    0.1,
+    "98 of 100 causes leave less of the excess of the object's poses",
+);
 pub const DOUBTFUL_EXCESS: Criterion = criterion(
     "doubtful",
     "least gaps",
@@ -60,26 +64,27 @@ pub const TURNS_WITHIN: Criterion =
     criterion("turns_within", "least gaps", 0.12, "scale of the logistic function of the excess around `doubtful`");
 pub const NONE_IS_RIGHT: Criterion = criterion(
     "none_is_right",
-    SHARE,
+    UNIT_OF_SHARES,
     0.96,
     "of verdicts `none` with an excess below half of `doubtful` so many are right",
 );
-pub const CLASS_IS_RIGHT: Criterion = criterion("class_is_right", SHARE, 0.9, "of classes so many hold the cause");
+pub const CLASS_IS_RIGHT: Criterion =
+    criterion("class_is_right", UNIT_OF_SHARES, 0.9, "of classes so many hold the cause");
 pub const UNKNOWN_IS_RIGHT: Criterion = criterion(
     "unknown_is_right",
-    SHARE,
+    UNIT_OF_SHARES,
     0.7,
     "of verdicts `unexplained` of a gap that is plain so many are of a cause outside of the library",
 );
 pub const UNKNOWN_OF_LITTLE_IS_RIGHT: Criterion = criterion(
     "unknown_of_little_is_right",
-    SHARE,
+    UNIT_OF_SHARES,
     0.2,
     "the same of a gap of less: mostly an effect that is too weak to be identified",
 );
 pub const NAMED_IS_WRONG: Criterion = criterion(
     "named_is_wrong",
-    SHARE,
+    UNIT_OF_SHARES,
     0.04,
     "of verdicts `named` so many name what is not there: kept for causes outside of the library",
 );
