@@ -2,7 +2,6 @@
 
 use super::{Options, identify};
 use crate::answer::identification::Identification;
-use crate::identify::IdentifyError;
 use crate::identify::test_pushes::{DAMPING, FRICTION, session, session_of};
 use inference::interrupt::Interrupt;
 use std::path::Path;
