@@ -71,15 +71,16 @@ fn why(finding: &Finding<'_>, k: usize, material: &Material) -> Option<String> {
     let setting = &finding.settings[k];
     let (value, half) = (finding.fit.shared[k], finding.intervals.half_width[k]);
     let remedy = remedy(setting, material);
+    // Before the bound: a number that nothing shows may have drifted there, and a wider range would help no one.
+    if !shows(finding, k) {
+        return Some(format!("nothing in these clips depends on it; {remedy}"));
+    }
     if finding.held[k] {
         let end = finding.nearer_bound(k);
         let or = if material.cell.robot.is_some() { ", or ask `calibration diagnose` what else acts" } else { "" };
         return Some(format!(
             "the best value lies at or beyond {value:.4}, the {end} bound of its range in cell.toml: widen the range{or}"
         ));
-    }
-    if !shows(finding, k) {
-        return Some(format!("nothing in these clips depends on it; {remedy}"));
     }
     let relative = matches!(setting, Setting::Friction | Setting::Mass) && half > OPEN_FROM_SHARE_OF_VALUE * value;
     if !relative && half <= OPEN_FROM_SHARE_OF_RANGE * range(finding, k) {
