@@ -5,7 +5,7 @@ use crate::sources::{Source, below};
 use std::path::Path;
 
 /// Where the statistics stand, today and before they were a crate.
-const ENGINE: [&str; 10] = [
+const ENGINE: [&str; 11] = [
     "calibration/src/answer/",
     "calibration/src/diagnose/",
     "calibration/src/identify/",
@@ -16,9 +16,10 @@ const ENGINE: [&str; 10] = [
     "calibration/inference/src/estimate/",
     "calibration/inference/src/forward/",
     "calibration/inference/src/likelihood/",
+    "calibration/inference/src/object_fit/",
 ];
 const DIAGNOSE: [&str; 1] = ["calibration/src/diagnose/"];
-const IDENTIFY: [&str; 1] = ["calibration/src/identify/"];
+const IDENTIFY: [&str; 2] = ["calibration/src/identify/", "calibration/inference/src/object_fit/"];
 const FORWARD: [&str; 3] =
     ["calibration/src/forward/", "calibration/inference/src/forward/", "calibration/inference/src/likelihood/"];
 /// What follows from clips, and not what trials of policies say.

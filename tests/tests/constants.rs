@@ -8,11 +8,8 @@ use tests::texts::root;
 const READ: [&str; 4] =
     ["calibration/inference/src", "calibration/capture/src", "calibration/src/diagnose", "calibration/src/identify"];
 
-/// Files that still have names of one generic word. The list only ever gets shorter.
-const NOT_YET: &[&str] = &[];
-
 /// Numeric constants of `diagnose`: no more than there are today.
-const MOST_NUMBERS_OF_DIAGNOSE: usize = 119;
+const MOST_NUMBERS_OF_DIAGNOSE: usize = 117;
 
 /// The constants of every file below a folder that is no test, with its name.
 fn by_file(folder: &str) -> Vec<(String, Vec<Constant>)> {
@@ -24,14 +21,7 @@ fn by_file(folder: &str) -> Vec<(String, Vec<Constant>)> {
 fn constants_are_named_for_what_they_are() {
     for (file, constants) in READ.iter().flat_map(|folder| by_file(folder)) {
         let generic: Vec<&str> = constants.iter().filter(|c| c.is_generic()).map(|c| c.name.as_str()).collect();
-        let listed = NOT_YET.contains(&file.as_str());
-        assert!(generic.is_empty() || listed, "{file}: {generic:?} say how much and not what");
-        if generic.is_empty() && listed {
-            eprintln!("{file} has no such name left: its line can go");
-        }
-    }
-    for file in NOT_YET.iter().filter(|file| !root().join(file).exists()) {
-        eprintln!("{file} is gone: its line can go");
+        assert!(generic.is_empty(), "{file}: {generic:?} say how much and not what");
     }
 }
 
