@@ -214,13 +214,14 @@ fn a_gain_beyond_its_search_rests_on_the_bound_and_is_open() {
 fn weight_of_links_whose_masses_nobody_knows_is_found_with_the_gains() {
     let pulled = with_effect(&TRUTH, "joint_weight", &[("constant", 0.0), ("sine", 1.5), ("cosine", 0.0)]);
     let found = identify(session(&pulled, 11, 3));
-    let (weight, of) = (&found.parameters["joint_weight.sine"], &found.parameters["joint_weight.constant"]);
-    assert_eq!((weight.unit.as_str(), weight.value.len(), of.value.len()), ("N m", DOF, DOF));
+    let part = |name: &str| &found.parameters[&format!("joint_weight.{name}")];
+    assert_eq!((part("sine").unit.as_str(), part("sine").value.len(), part("constant").value.len()), ("N m", DOF, DOF));
     // Over a small swing a constant and a sine are nearly one: what counts is the torque where it swings.
-    let cosine = &found.parameters["joint_weight.cosine"].value;
+    let (sine, cosine) = 0.46_f64.sin_cos();
     for joint in 0..DOF {
-        let pull = of.value[joint] + weight.value[joint] * 0.46_f64.sin() + cosine[joint] * 0.46_f64.cos();
-        assert!((pull - 1.5 * 0.46_f64.sin()).abs() < 0.02, "joint {joint}: {pull}");
+        let of = |name| part(name).value[joint];
+        let pull = of("constant") + of("sine") * sine + of("cosine") * cosine;
+        assert!((pull - 1.5 * sine).abs() < 0.02, "joint {joint}: {pull}");
     }
     let [value, half] = found_gains(&found)[0];
     assert!((value / 33.0 - 1.0).abs() < 0.05 && half > found_gains(&FOUND)[0][1] * 0.5, "{value} {half}");

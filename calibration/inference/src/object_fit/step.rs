@@ -118,7 +118,7 @@ impl Question<'_> {
         Ok(Linearised { evaluations: strokes.evaluations, ..at })
     }
 
-    /// By how much wider than slopes say the clips leave each number, 1 to [`MAX_WIDENING`]: the deviance is looked at where the
+    /// By how much wider than slopes say the clips leave each number, 1 to `MAX_WIDENING`: the deviance is looked at where the
     /// 95 % interval ends, to both sides, the other numbers following. A hit's roughness makes slopes, and
     /// so information, larger than what the clips can really tell, and nearer by nothing but the roughness would be seen.
     ///

@@ -219,7 +219,7 @@ fn a_stroke_is_hit_when_the_tool_comes_and_its_joints_count_from_there() {
     clips.set_model_error(ModelError { joints: Some(1e-4), ..clips.model_error() });
     let rows = clips.rows(0);
     let joints: Vec<&Row> = rows.iter().filter(|row| matches!(row.channel, Channel::Joint(_))).collect();
-    assert!(joints.len() > 7 * 5 && joints.len() % 7 == 0, "{}", joints.len());
+    assert!(joints.len() > 7 * 5 && joints.len().is_multiple_of(7), "{}", joints.len());
     assert!(
         joints.iter().all(|row| row.stamp_ns + 60_000_000 > contact && row.part != Part::After),
         "from the touch on"
