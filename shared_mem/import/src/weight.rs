@@ -140,7 +140,7 @@ impl Weight {
             return Finding::Scaled(None, share);
         }
         // The other way round of the model's own size: a base that hangs.
-        let another = ALL.contains(&size) && cosine < ANOTHER_WAY.cos();
+        let another = ALL.contains(&size) && self.angle(falls) > ANOTHER_WAY;
         if sure && another && NORMAL_95 * sigma < NONE {
             return Finding::Elsewhere;
         }
@@ -152,6 +152,17 @@ impl Weight {
             share if none && !self.holds_some(falls) => Finding::Absent(share),
             share => Finding::Partly(share),
         }
+    }
+
+    /// The least angle between the pull and the model's that its 95 % interval leaves [rad]: what few moments make of a direction
+    /// across is as wide as the strength along it is narrow.
+    fn angle(&self, falls: [f64; 3]) -> f64 {
+        let share = dot(self.pull, falls) / dot(falls, falls);
+        let along = falls.map(|falls| share * falls);
+        let across: [f64; 3] = std::array::from_fn(|axis| self.pull[axis] - along[axis]);
+        let size = dot(across, across).sqrt();
+        let sigma = dot(across, product(&self.covariance, across)).max(0.0).sqrt() / size.max(1e-12);
+        (size - NORMAL_95 * sigma).max(0.0).atan2(share * dot(falls, falls).sqrt())
     }
 
     /// Whether torques that hold a weight the other way round have their motion the other way round, too.
