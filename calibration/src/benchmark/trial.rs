@@ -104,11 +104,11 @@ impl TrialContext<'_> {
         let judged = || {
             let truth = bench.fit(&effects, full, &self.split.train, even, Some(baseline), EFFORT)?;
             let deviance = |hypothesis: &Hypothesis| -> Option<f64> {
-                Some(bench.judge(hypothesis, &self.split.confirm, even)?.iter().map(FittedClip::deviance).sum())
+                Some(bench.judge(hypothesis, self.split.elsewhere(), even)?.iter().map(FittedClip::deviance).sum())
             };
             let gain = deviance(baseline)? - deviance(&truth)?;
             let [before, after] =
-                [baseline, &truth].map(|hypothesis| Residuals::at(bench, hypothesis, &self.split.confirm));
+                [baseline, &truth].map(|hypothesis| Residuals::at(bench, hypothesis, self.split.elsewhere()));
             Some((gain.max(0.0).sqrt(), 1.0 - after?.mean_square() / before?.mean_square()))
         };
         judged().unwrap_or((0.0, 0.0))

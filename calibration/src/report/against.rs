@@ -125,7 +125,11 @@ fn smallest(candidate: &Candidate) -> String {
 
 fn origin(found: &Comparison) -> Markup {
     let clips = &found.clips;
-    let used = [("fitted to", &clips.train), ("chosen on", &clips.choose), ("held out: gap and share", &clips.confirm)];
+    let used = [
+        ("fitted to", &clips.train),
+        ("chosen on", &clips.choose),
+        ("held out in turn: gap and share", &clips.confirm),
+    ];
     html! {
         section {
             h2 { "Where this comes from" }

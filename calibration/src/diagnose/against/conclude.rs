@@ -1,4 +1,4 @@
-//! From what the search found to the answer: the clips kept for confirming are opened here, and only here.
+//! From what the search found to the answer, measured on held-out clips.
 
 use super::answer::{Candidate, Comparison, Smallest, Verdict};
 use super::changes;
@@ -16,6 +16,7 @@ use crate::diagnose::criteria::{CLASS_IS_RIGHT, MOST_OF_IT, UNKNOWN_IS_RIGHT};
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::confidence::MAX_PROBABILITY;
 use crate::diagnose::judge::gap::Residuals;
+use crate::diagnose::judge::held_out::HeldOut;
 use crate::diagnose::judge::localise;
 use crate::diagnose::judge::sizes::Sizes;
 use crate::diagnose::select::gain::SAME_WORTH_NATS;
@@ -37,7 +38,7 @@ pub(super) struct Case<'a> {
     pub(super) found: &'a Found,
 }
 
-/// Opens the clips kept for confirming and says what was found.
+/// Measures and says what was found.
 ///
 /// # Errors
 /// [`DiagnoseError`] when the twin has no answer on them.
@@ -47,11 +48,11 @@ pub(super) fn conclude<E: Evidence>(
     options: &Options,
 ) -> Result<Comparison, DiagnoseError> {
     let (found, session) = (case.found, case.sessions[1]);
-    let held_out = pair_bench.held_out(&found.last.fitted, &found.weights).ok_or(DiagnoseError::NoBaseline)?;
-    let with = Residuals::of(pair_bench.bench, &held_out).ok_or(DiagnoseError::NoBaseline)?;
-    let under_a: Vec<_> = held_out.iter().map(|(_, clips)| (numbers(case.of_a.full.clone()), clips.clone())).collect();
-    let before = Residuals::of(pair_bench.bench, &under_a).ok_or(DiagnoseError::NoBaseline)?;
-    let shrink = with.shrink(&before, options.seed);
+    let with = pair_bench.held_out(&found.last.fitted, &found.weights).ok_or(DiagnoseError::NoBaseline)?;
+    let under_a = with.fits.iter().map(|(_, clips)| (numbers(case.of_a.full.clone()), clips.clone())).collect();
+    let under_a = HeldOut::of(pair_bench.bench, under_a).ok_or(DiagnoseError::NoBaseline)?;
+    let before = &under_a.left;
+    let shrink = with.left.shrink(before, options.seed);
     let rivals = rivals(pair_bench, case);
     let deviates = deviates(pair_bench, case);
     let kind = match (found.last.changed.is_empty() || shrink.value <= 0.0, rivals.is_empty()) {
@@ -61,15 +62,14 @@ pub(super) fn conclude<E: Evidence>(
         (false, false) => Kind::Class,
     };
     let believed = matches!(kind, Kind::Named | Kind::Class);
-    let after = if believed { &with } else { &before };
-    let fits = if believed { &held_out } else { &under_a };
-    let gap = Sizes::of(pair_bench.bench, ([&under_a, fits], [&before, after]), session, &case.pair.admitted)?.gap(
-        [&before, after],
-        SensorGap::of_groups(&before.typical(), &after.typical()),
+    let shown = if believed { &with } else { &under_a };
+    let gap = Sizes::of(pair_bench.bench, [&under_a, shown], session, &case.pair.admitted)?.gap(
+        [before, &shown.left],
+        SensorGap::of_groups(&before.typical(), &shown.left.typical()),
         options.seed,
     );
-    let (gap_of_a, places) = (of_a(pair_bench, case), localise::localise(pair_bench.bench.evidence, &before));
-    let candidates = candidates(pair_bench, case, kind, &rivals, &before, options.seed);
+    let (gap_of_a, places) = (of_a(pair_bench, case), localise::localise(pair_bench.bench.evidence, before));
+    let candidates = candidates(pair_bench, case, kind, &rivals, before, options.seed);
     let changes: Vec<String> = if believed { named(case, &rivals) } else { Vec::new() };
     let facts = Facts::of(&candidates, gap.shrink, deviates.unwrap_or(1.0), places.first());
     let text = headline::sentence(kind, &facts);
@@ -103,7 +103,7 @@ pub(super) fn conclude<E: Evidence>(
     })
 }
 
-/// What A's own clips kept for confirming leave under what was found on A.
+/// What A's own clips leave under what was found on A.
 fn of_a<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> f64 {
     let clips: Vec<usize> =
         pair_bench.split.confirm.iter().copied().filter(|clip| !pair_bench.is_of_b(*clip)).collect();
@@ -114,7 +114,7 @@ fn of_a<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> f64 {
 /// where A leaves most of it as well.
 fn deviates<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Option<f64> {
     let (of_b, of_a): (Vec<usize>, Vec<usize>) =
-        pair_bench.split.open().into_iter().partition(|clip| pair_bench.is_of_b(*clip));
+        pair_bench.split.searched().into_iter().partition(|clip| pair_bench.is_of_b(*clip));
     let b = pair_bench.left(case.found.without.model.of(Side::B), &of_b)?;
     let a = pair_bench.left(&case.of_a.full, &of_a)?;
     let groups = SensorGap::of_groups(&b.typical(), &a.typical());
@@ -169,7 +169,7 @@ fn candidates<E: Evidence>(
         let fitted = if changed { Some(&found.last.fitted) } else { trial.map(|trial| &trial.fitted) };
         let with = fitted
             .filter(|_| changed || rivals.contains(&index))
-            .and_then(|fitted| Residuals::of(pair_bench.bench, &pair_bench.held_out(fitted, &found.weights)?));
+            .and_then(|fitted| Some(pair_bench.held_out(fitted, &found.weights)?.left));
         let shrink = with.map_or(Share { value: 0.0, ci90: [0.0; 2] }, |with| with.shrink(before, seed));
         let score = first.scores.iter().find(|score| score.subject == index);
         let smallest = score.map(|score| smallest(pair_bench, score)).unwrap_or_default();

@@ -6,7 +6,7 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::Effort;
 use crate::diagnose::fit::multi_start::Fit;
 use crate::diagnose::judge::gap::Residuals;
-use crate::diagnose::judge::held_out;
+use crate::diagnose::judge::held_out::{self, HeldOut};
 use crate::diagnose::judge::score::{Predicted, predict};
 use crate::diagnose::select::criteria::CHANGES;
 use crate::diagnose::select::gain::Gain;
@@ -69,14 +69,14 @@ impl<E: Evidence> PairBench<'_, E> {
     }
 
     /// Numbers of B for clips of B that they were not fitted to.
-    pub(super) fn held_out(&self, fitted: &Fitted, weights: &[f64]) -> Option<held_out::Fits> {
+    pub(super) fn held_out(&self, fitted: &Fitted, weights: &[f64]) -> Option<HeldOut> {
         let fits =
             self.on_bench(&fitted.model, |bench| held_out::fits(bench, self.split, &fitted.hypothesis, weights))?;
         let of_b = |(fit, clips): (Hypothesis, Vec<usize>)| {
             let clips: Vec<usize> = clips.into_iter().filter(|clip| self.is_of_b(*clip)).collect();
             (numbers(fitted.model.full(Side::B, &fit.full)), clips)
         };
-        Some(fits.into_iter().map(of_b).filter(|(_, clips)| !clips.is_empty()).collect())
+        HeldOut::of(self.bench, fits.into_iter().map(of_b).filter(|(_, clips)| !clips.is_empty()).collect())
     }
 
     /// What numbers leave of some clips, on which they may have been fitted.

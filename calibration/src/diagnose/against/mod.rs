@@ -157,7 +157,7 @@ impl Question for Changed<'_> {
 /// Whether the parameters alone leave of A so little beyond the noise that an effect has nothing to explain: as far below doubt as where
 /// sessions in which no cause is seen have none ([`crate::diagnose::criteria::NONE_IS_RIGHT`]).
 fn is_explained<E: Evidence>(bench: &Bench<'_, E>, of_a: &Split, baseline: &Hypothesis) -> bool {
-    let Some(left) = Residuals::at(bench, baseline, &of_a.open()) else { return false };
+    let Some(left) = Residuals::at(bench, baseline, &of_a.searched()) else { return false };
     SensorGap::of_groups(&left.typical(), &left.typical())
         .iter()
         .all(|left| left.gaps() < MOST_OF_IT * DOUBTFUL_EXCESS.value)
@@ -201,12 +201,12 @@ mod tests {
     }
 
     #[test]
-    fn of_few_commands_one_of_each_session_is_left_out_in_turn_and_of_many_some_are_kept() {
+    fn of_few_commands_one_of_each_session_is_left_out_in_turn_and_of_many_some_are_not_fitted() {
         let few = split(4, 5);
         assert_eq!(few.in_turn, [vec![0, 4], vec![1, 5], vec![2, 6], vec![3, 7], vec![8]]);
         assert_eq!(of_a(&few, 4).in_turn, [[0], [1], [2], [3]]);
         let many = split(8, 8);
-        assert!(many.in_turn.is_empty() && many.confirm.iter().any(|clip| *clip >= 8));
+        assert!(!many.is_of_few() && many.confirm.iter().any(|clip| *clip >= 8));
         assert!(of_a(&many, 8).confirm.iter().all(|clip| *clip < 8));
     }
 }

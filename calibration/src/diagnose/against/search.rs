@@ -8,7 +8,6 @@ use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{REFINEMENT, SCREENING};
 use crate::diagnose::fit::multi_start::{Fit as _, cheapest};
 use crate::diagnose::fit::stages;
-use crate::diagnose::search::refit::last_pass;
 use crate::diagnose::select::criteria::CHANGES;
 use crate::diagnose::select::forward::{Selection, backward, forward};
 use crate::diagnose::select::gain::Gain;
@@ -144,7 +143,7 @@ type Shared = (Fitted, f64);
 
 impl<E: Evidence> Changes<'_, E> {
     fn fitted(&self, model: Model, near: Option<&Fitted>) -> Option<Fitted> {
-        self.pair_bench.fit(model, &self.weights, near, last_pass(self.pair_bench.bench))
+        self.pair_bench.fit(model, &self.weights, near, self.pair_bench.bench.last_pass())
     }
 
     /// What the slopes around a model say.

@@ -5,14 +5,11 @@ use super::Case;
 use super::measure::Measures;
 use super::verdict::{Decision, Finding};
 use crate::answer::diagnosis::Kind;
-use crate::diagnose::fit::bench::Hypothesis;
-use crate::diagnose::judge::gap::Residuals;
-use crate::diagnose::judge::held_out::Fits;
+use crate::diagnose::judge::held_out::Measured;
 use crate::diagnose::judge::partly::{self, Partly};
 use crate::diagnose::judge::score::predict;
 use crate::diagnose::judge::trial::{Found, Step};
 use crate::diagnose::judge::{confidence, drift, remainder};
-use crate::diagnose::search::refit;
 use inference::likelihood::Evidence;
 
 /// The verdict, and what it rests on.
@@ -23,18 +20,11 @@ pub(super) struct Decided<'a> {
     pub(super) partly: Option<Partly>,
 }
 
-/// What an answer is about: effects that are believed, or the baseline.
-pub(super) struct Shown<'a> {
-    pub(super) hypothesis: &'a Hypothesis,
-    pub(super) fits: &'a Fits,
-    pub(super) left: &'a Residuals,
-}
-
 pub(super) fn decide<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Decided<'a> {
     let finding = finding(case, measures);
     let decision = finding.decide();
     let partly = if decision.kind == Kind::Unexplained {
-        let (before, overdispersion) = (&measures.without.left, &measures.overdispersion);
+        let (before, overdispersion) = (&measures.without.held_out.left, &measures.overdispersion);
         partly::proven(case.bench, case.split, case.found, before, overdispersion, case.options.seed)
     } else {
         None
@@ -52,18 +42,14 @@ impl Decided<'_> {
         self.partly.as_ref().map_or(case.found, |partly| &partly.found)
     }
 
-    /// What the effects that were found leave, believed or not.
-    pub(super) fn after<'b>(&'b self, measures: &'b Measures) -> &'b Residuals {
-        self.partly.as_ref().map_or(&measures.with.left, |partly| &partly.after)
+    /// The effects that were found, believed or not.
+    pub(super) fn with<'b>(&'b self, measures: &'b Measures) -> &'b Measured {
+        self.partly.as_ref().map_or(&measures.with, |partly| &partly.measured)
     }
 
-    pub(super) fn shown<'b, E: Evidence>(&'b self, case: &'b Case<'_, E>, measures: &'b Measures) -> Shown<'b> {
-        let Measures { without, with, .. } = measures;
-        match &self.partly {
-            Some(Partly { found, fits, after, .. }) => Shown { hypothesis: &found.last, fits, left: after },
-            None if self.believes() => Shown { hypothesis: &case.found.last, fits: &with.fits, left: &with.left },
-            None => Shown { hypothesis: &case.first().from, fits: &without.fits, left: &without.left },
-        }
+    /// What the answer is about: effects that are believed, or the baseline.
+    pub(super) fn shown<'b>(&'b self, measures: &'b Measures) -> &'b Measured {
+        if self.believes() { self.with(measures) } else { &measures.without }
     }
 
     /// Whether effects come near to explaining a gap that nothing explains.
@@ -92,9 +78,9 @@ fn finding<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Finding<
         of_arm: found.last.effects.iter().all(|effect| bench.library.candidates[*effect].is_of_arm()),
         left: measures.left.clone(),
         confirmed: measures.confirmation.holds,
-        implausible: !remainder::implausible(bench, &found.last).is_empty(),
+        implausible: !remainder::implausible(bench, &measures.with.of_all).is_empty(),
         within_tolerance: measures.within_tolerance,
-        drift: drift::of_friction(&bench.scatter, &found.last),
+        drift: drift::of_friction(&bench.scatter, &measures.with.of_all),
     }
 }
 
@@ -120,7 +106,7 @@ fn stands_in<E: Evidence>(case: &Case<'_, E>, step: &Step, effect: usize, rival:
     let mut full = last.full.clone();
     bench.library.candidates[effect].numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
     bench.library.candidates[rival].numbers.clone().for_each(|k| full[k] = fit.full[k]);
-    let swapped = bench.fit(&effects, full, &split.train, weights, Some(last), refit::last_pass(bench));
+    let swapped = bench.fit(&effects, full, &split.train, weights, Some(last), bench.last_pass());
     let predicted = |hypothesis| predict(bench, hypothesis, &split.choose, weights);
     let Some((with, instead)) = predicted(last).zip(swapped.as_ref().and_then(predicted)) else { return true };
     with.over(&instead).may_be_none(1.0)

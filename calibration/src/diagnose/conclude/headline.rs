@@ -36,18 +36,24 @@ pub(super) struct NotProven {
 }
 
 impl Shrunk {
-    /// `by 96 % on held-out clips`. Where one clip outweighs all others, what most do, and in how many it grows.
+    /// `by 96 % (94 % to 97 %) on held-out clips`. Where some clips outweigh all others, what most do, and in how many it grows.
     fn in_words(&self) -> String {
         let [shrinks, all] = self.clips;
-        if self.mean >= MIN_SHARE_CLOSED || shrinks == all {
-            let percent = percent(self.mean).replace("> ", "more than ").replace("< ", "less than ");
-            return format!("by {percent} on held-out clips");
+        if self.mean.value >= MIN_SHARE_CLOSED || shrinks == all {
+            return format!("by {} on held-out clips", with_interval(&self.mean));
         }
         // Before and after the hit nothing may change where the cause acts in it alone.
-        let of_contact = self.usual <= MIN_SHARE_CLOSED && self.contact > self.usual;
+        let of_contact = self.usual.value <= MIN_SHARE_CLOSED && self.contact.value > self.usual.value;
         let (share, whose) = if of_contact { (self.contact, "the joints in contact of ") } else { (self.usual, "") };
-        format!("by {} in {whose}a held-out clip like most, but grows in {} of {all}", percent(share), all - shrinks)
+        let (share, grows) = (with_interval(&share), all - shrinks);
+        format!("by {share} in {whose}a held-out clip like most, but grows in {grows} of {all}")
     }
+}
+
+/// `96 % (94 % to 97 %)`.
+fn with_interval(share: &Share) -> String {
+    let [low, high] = share.ci90.map(percent);
+    format!("{} ({low} to {high})", percent(share.value).replace("> ", "more than ").replace("< ", "less than "))
 }
 
 /// Residuals beyond this multiple of the noise are said, even where they are no gap [1] (a choice).
@@ -125,11 +131,10 @@ pub(super) fn in_part(
         Some(effect) => format!("; {} explains most of that", words(effect)),
         None => "; no effect of the library explains much of that".to_owned(),
     };
-    let [low, high] = share.ci90.map(percent);
+    let share = with_interval(share);
     format!(
-        "{first}{who}{strength} {verb} {} of the squared gap ({low} to {high}), {}: with {these} in the twin {after} stay on held-out \
+        "{first}{who}{strength} {verb} {share} of the squared gap, {}: with {these} in the twin {after} stay on held-out \
          clips, largest in {}{alike}{apart}.",
-        percent(share.value),
         size_and_place(facts),
         facts.rest
     )
@@ -161,7 +166,7 @@ fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> Str
         let shrinks = if finding.confirmed {
             format!("shrinks it {} and leaves more than a cause does", facts.shrink.in_words())
         } else {
-            "does not shrink it on the clips kept for confirming".to_owned()
+            "does not predict clips better that it was not fitted to".to_owned()
         };
         format!("; {} comes nearest{strength} but {shrinks}", facts.effects.join(" with "))
     };
@@ -204,7 +209,12 @@ mod tests {
             rest: "yaw (after the slide)".into(),
             effects: effects.iter().map(|name| (*name).to_owned()).collect(),
             unproven: None,
-            shrink: Shrunk { mean: 0.963, usual: 0.97, contact: 0.0, clips: [4, 4] },
+            shrink: Shrunk {
+                mean: Share { value: 0.963, ci90: [0.94, 0.972] },
+                usual: Share { value: 0.97, ci90: [0.95, 0.98] },
+                contact: Share::default(),
+                clips: [4, 4],
+            },
         }
     }
 
@@ -217,7 +227,7 @@ mod tests {
         assert_eq!(
             said(&finding(vec!["command_delay"], 500.0, 1.5), &["command delay (delay 11.9 ms)"]),
             "command delay (delay 11.9 ms) causes the gap, 2.13 mrad RMS, largest in joint 2 (reversal): with it in the twin \
-             the gap shrinks by 96 % on held-out clips."
+             the gap shrinks by 96 % (94 % to 97 %) on held-out clips."
         );
         let class = Finding { rivals: vec!["command_lag"], ..finding(vec!["command_delay"], 500.0, 1.5) };
         let text = said(&class, &["command delay (delay 11.9 ms)"]);
@@ -230,14 +240,21 @@ mod tests {
 
     #[test]
     fn a_clip_that_outweighs_the_others_is_said_and_not_averaged() {
-        let shrink = Shrunk { mean: -0.15, usual: 0.62, clips: [3, 4], ..Shrunk::default() };
+        let share = |value, ci90| Share { value, ci90 };
+        let (mean, usual) = (share(-0.15, [-1.0, 0.5]), share(0.62, [0.2, 0.8]));
+        let shrink = Shrunk { mean, usual, clips: [3, 4], ..Shrunk::default() };
         let found = finding(vec!["camera_scale"], 30.0, 1.5);
         let text = sentence(&found.decide(), &found, &Facts { shrink, ..facts(&["camera scale (scale 0.02)"]) });
-        assert!(text.ends_with("the gap shrinks by 62 % in a held-out clip like most, but grows in 1 of 4."), "{text}");
-        let shrink = Shrunk { usual: 0.0, contact: 0.9, ..shrink };
+        assert!(
+            text.ends_with("the gap shrinks by 62 % (20 % to 80 %) in a held-out clip like most, but grows in 1 of 4."),
+            "{text}"
+        );
+        let shrink = Shrunk { usual: Share::default(), contact: share(0.9, [0.85, 0.95]), ..shrink };
         let text = sentence(&found.decide(), &found, &Facts { shrink, ..facts(&["camera scale (scale 0.02)"]) });
         assert!(
-            text.ends_with("by 90 % in the joints in contact of a held-out clip like most, but grows in 1 of 4."),
+            text.ends_with(
+                "by 90 % (85 % to 95 %) in the joints in contact of a held-out clip like most, but grows in 1 of 4."
+            ),
             "{text}"
         );
     }

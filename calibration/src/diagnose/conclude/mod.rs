@@ -1,9 +1,9 @@
-//! From what the search found to an answer: measured on the clips kept for confirming, decided, and said, with what to do about it and
+//! From what the search found to an answer: measured on held-out clips, decided, and said, with what to do about it and
 //! what to record next.
 //!
 //! | module | |
 //! |---|---|
-//! | `measure` | what the confirm clips say |
+//! | `measure` | what held-out clips say |
 //! | `verdict`, `decide` | which of the five verdicts it is |
 //! | `headline` | its sentence |
 //! | `advice`, `site` | what to record next, and the commands for it |
@@ -67,7 +67,7 @@ impl<E: Evidence> Case<'_, E> {
     }
 }
 
-/// Opens the confirm clips and says what was found.
+/// Measures and says what was found.
 ///
 /// # Errors
 /// [`DiagnoseError`] when the twin has no answer on them.

@@ -9,13 +9,14 @@ use crate::answer::diagnosis::{Candidate, Kind, Share, Status};
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::shortlist::TESTABLE;
 use crate::diagnose::fit::{parameters, time_step};
+use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::gap::{Residuals, SHRINK_OF_A_DOUBLED_GAP};
+use crate::diagnose::judge::held_out::{Measured, estimated};
 use crate::diagnose::judge::trial::{Found, Step, Trial};
-use crate::diagnose::judge::{confidence, held_out};
 use crate::diagnose::propose::screening;
 use inference::likelihood::Evidence;
 
-/// Of numbers with which the twin has no answer in the clips kept for confirming.
+/// Of numbers with which the twin has no answer in clips that they were not fitted to.
 const NO_ANSWER: Share = Share { value: SHRINK_OF_A_DOUBLED_GAP, ci90: [SHRINK_OF_A_DOUBLED_GAP; 2] };
 
 /// What is said of every candidate: what was named first, then what is possible, then the likelier.
@@ -26,11 +27,11 @@ pub(super) fn candidates<E: Evidence>(
     kind: Kind,
 ) -> Vec<Candidate> {
     let Case { bench, split, .. } = *case;
-    let (found, before) = (decided.found(case), &measures.without.left);
+    let (found, before) = (decided.found(case), &measures.without.held_out.left);
     let first = &found.steps[0];
     let last = found.steps.last().filter(|_| !found.last.effects.is_empty());
-    let on_confirm = |step: &Step| held_out::residuals(bench, split, &step.from, &step.weights);
-    let of_step = |step: &Step| if step.from.effects.is_empty() { Some(before.clone()) } else { on_confirm(step) };
+    let held_out = |step: &Step| Some(Measured::of(bench, split, &step.from, &step.weights).ok()?.held_out.left);
+    let of_step = |step: &Step| if step.from.effects.is_empty() { Some(before.clone()) } else { held_out(step) };
     let drawn_from = DrawnFrom {
         case,
         measures,
@@ -39,7 +40,9 @@ pub(super) fn candidates<E: Evidence>(
         found,
         believed: matches!(kind, Kind::Named | Kind::Class),
         likely: confidence::probabilities(&first.trials, found.last.effects.is_empty()),
-        time_step: last.and_then(|last| time_step::error(bench, &found.last, &last.weights)).unwrap_or_default(),
+        time_step: last
+            .and_then(|last| time_step::error(bench, &decided.with(measures).of_all, &last.weights))
+            .unwrap_or_default(),
         left: found.steps.iter().map(of_step).collect(),
     };
     let mut all: Vec<Candidate> = first.trials.iter().map(|trial| drawn_from.said_of(trial)).collect();
@@ -62,7 +65,7 @@ struct DrawnFrom<'a, E> {
     likely: Vec<(usize, f64)>,
     /// How far the twin's time step moves the numbers of the last hypothesis.
     time_step: Vec<f64>,
-    /// What every step left on the confirm clips: the baseline is known, and others are what their candidates are measured from.
+    /// What every step left: the baseline is known, and others are what their candidates are measured from.
     left: Vec<Option<Residuals>>,
 }
 
@@ -71,23 +74,23 @@ impl<E: Evidence> DrawnFrom<'_, E> {
     fn said_of(&self, trial: &Trial) -> Candidate {
         let Self { case, measures, found, kind, .. } = *self;
         let (bench, finding) = (case.bench, &self.decided.finding);
-        let (before, after) = (&measures.without.left, self.decided.after(measures));
+        let (before, with) = (&measures.without.held_out.left, self.decided.with(measures));
         let effect = trial.scored.candidate;
         let name = case.name(effect);
         let kept = self.believed && found.last.effects.contains(&effect);
         let place = judged_in(found, effect, self.believed);
         let step = &found.steps[place];
         let trial = step.trial(effect).unwrap_or(trial);
-        let with = match &trial.fitted {
-            _ if kept => after_keeping(found, &self.left, after, place),
-            Some((fit, _)) => held_out::estimated(bench, case.split, fit, &step.weights),
+        let left = match &trial.fitted {
+            _ if kept => after_keeping(found, &self.left, &with.held_out.left, place),
+            Some((fit, _)) => estimated(bench, case.split, fit),
             None => None,
         };
-        let closed = with.as_ref().zip(self.left[place].as_ref());
-        let shrink = closed.map(|(with, from)| with.shrink_added(from, before, case.options.seed));
+        let closed = left.as_ref().zip(self.left[place].as_ref());
+        let shrink = closed.map(|(left, from)| left.shrink_added(from, before, case.options.seed));
         let shrink = shrink.unwrap_or(if trial.fitted.is_some() { NO_ANSWER } else { Share::default() });
         let beside: Vec<&str> = step.from.effects.iter().map(|effect| case.name(*effect)).collect();
-        let fit = if kept { Some(&found.last) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
+        let fit = if kept { Some(&with.of_all) } else { trial.fitted.as_ref().map(|(fit, _)| fit) };
         let time_step = if kept { &self.time_step[..] } else { &[] };
         let probability = self.likely.iter().find(|(candidate, _)| *candidate == effect).map_or(0.0, |(_, p)| *p);
         let hidden = is_hidden_by_the_arm(bench, step, trial);
@@ -97,7 +100,7 @@ impl<E: Evidence> DrawnFrom<'_, E> {
             _ if hidden || trial.scored.signal < TESTABLE => Status::NotTestable,
             _ => Status::RuledOut,
         };
-        let times_noise = with.as_ref().map(|with| (with.mean_square() / with.floor()).sqrt());
+        let times_noise = left.as_ref().map(|left| (left.mean_square() / left.floor()).sqrt());
         let judged = Judged { trial, place, beside: &beside, status, hidden, times_noise, kind, finding };
         Candidate {
             effect: name.into(),
@@ -154,7 +157,7 @@ fn carried_over(shrink: &Share) -> &'static str {
     if shrink.value > SHRINK_OF_A_DOUBLED_GAP {
         return "";
     }
-    "; its numbers fit the clips they were found on alone: on those kept for confirming the gap more than doubles"
+    "; its numbers fit the clips they were found on alone: on the others the gap more than doubles"
 }
 
 #[cfg(test)]

@@ -9,12 +9,14 @@ use super::{advice, ranked, remedies, verdict};
 use crate::answer::Trace;
 use crate::answer::diagnosis::{Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Rest, Verdict};
 use crate::diagnose::criteria::CLASS_IS_RIGHT;
+use crate::diagnose::fit::bench::Hypothesis;
+use crate::diagnose::judge::ends;
 use crate::diagnose::judge::gap::Residuals;
+use crate::diagnose::judge::held_out::Measured;
 use crate::diagnose::judge::localise::localise;
 use crate::diagnose::judge::partly::Partly;
 use crate::diagnose::judge::sizes::Sizes;
 use crate::diagnose::judge::unproven::{Unproven, unproven};
-use crate::diagnose::judge::{ends, held_out};
 use crate::diagnose::work::{DiagnoseError, Options};
 use crate::words::{channel_in_words, words};
 use inference::admit::{Admitted, COMMANDS_TO_CHOOSE_BY, Split};
@@ -60,10 +62,9 @@ pub(super) fn say<E: Evidence>(
     decided: &Decided<'_>,
 ) -> Result<Diagnosis, DiagnoseError> {
     let Case { bench, session, admitted, options, .. } = *case;
-    let (before, after) = (&measures.without.left, decided.after(&measures));
-    let shown = decided.shown(case, &measures);
-    let fits_and_left = ([&measures.without.fits, shown.fits], [before, shown.left]);
-    let sizes = Sizes::of(bench, fits_and_left, session, admitted)?;
+    let (without, with, shown) = (&measures.without, decided.with(&measures), decided.shown(&measures));
+    let (before, after) = (&without.held_out.left, &with.held_out.left);
+    let sizes = Sizes::of(bench, [&without.held_out, &shown.held_out], session, admitted)?;
     let open = not_proven(case, decided, before);
     let (verdict, rest) = verdict_of(case, &measures, decided, &sizes, open.as_ref());
     let site = Site::of(session, options.report.as_deref());
@@ -75,22 +76,22 @@ pub(super) fn say<E: Evidence>(
         effects: decided.finding.effects.iter().map(|name| (*name).to_owned()).collect(),
         shrink: after.shrink(before, options.seed),
     });
-    let theta = bench.library.theta(&shown.hypothesis.full);
+    let theta = bench.library.theta(&shown.of_all.full);
     // Of an object that no clip shows nothing was found but what was given.
     let known = if admitted.with_object { Some(&theta) } else { options.theta.as_ref() };
     let object = known.and_then(|known| known.object.clone());
-    let traced = if nearest.is_some() { after } else { shown.left };
+    let traced = if nearest.is_some() { after } else { &shown.held_out.left };
     let remedies = remedies::of(&verdict, &theta, &session.cell);
     Ok(Diagnosis {
-        gap: sizes.gap([before, shown.left], measures.left.clone(), options.seed),
+        gap: sizes.gap([before, &shown.held_out.left], measures.left.clone(), options.seed),
         candidates: ranked::candidates(case, &measures, decided, verdict.kind),
         remedies,
         clips: clips(admitted, case.split),
-        warnings: warnings(case, &shown.hypothesis.full, &shown.hypothesis.effects),
+        warnings: warnings(case, &shown.of_all),
         theta: Theta { object, ..theta },
         traces: traces(bench.evidence, [before, traced], admitted),
         nearest,
-        places: measures.without.places,
+        places: measures.places,
         ..about(session, options, &site, verdict, next)
     })
 }
@@ -103,14 +104,11 @@ fn verdict_of<E: Evidence>(
     sizes: &Sizes,
     open: Option<&(Unproven<'_>, f64)>,
 ) -> (Verdict, Vec<Place>) {
-    let places = &measures.without.places;
-    let rest = match &decided.partly {
-        Some(partly) => localise(case.bench.evidence, &partly.after),
-        None => measures.with.places.clone(),
-    };
+    let (places, with) = (&measures.places, decided.with(measures));
+    let rest = localise(case.bench.evidence, &with.held_out.left);
     let of_object = places.first().is_some_and(|place| !place.channel.starts_with("joint"));
     let [size, stays] = sizes.in_words(of_object);
-    let last = &decided.found(case).last;
+    let last = &with.of_all;
     let largest = |places: &[Place]| places.first().map_or_else(String::new, place_in_words);
     let facts = Facts {
         size,
@@ -139,8 +137,8 @@ fn not_proven<'a, E: Evidence>(
     before: &Residuals,
 ) -> Option<(Unproven<'a>, f64)> {
     let open = unproven(case.bench, decided.found(case), case.admitted.cut())?;
-    let left = held_out::residuals(case.bench, case.split, open.fit, &case.first().weights)?;
-    let share = left.shrink(before, case.options.seed).value;
+    let with = Measured::of(case.bench, case.split, open.fit, &case.first().weights).ok()?;
+    let share = with.held_out.left.shrink(before, case.options.seed).value;
     (share > 0.0).then_some((open, share))
 }
 
@@ -156,8 +154,9 @@ fn clips(admitted: &Admitted, split: &Split) -> Clips {
 }
 
 /// What has to be known beside the answer: of the recording, of few commands, of effects as strong as they are looked for.
-fn warnings<E: Evidence>(case: &Case<'_, E>, full: &[f64], effects: &[usize]) -> Vec<String> {
-    let ended = effects.iter().filter(|effect| !ends::stopped(case.bench.library, **effect, full).is_empty());
+fn warnings<E: Evidence>(case: &Case<'_, E>, shown: &Hypothesis) -> Vec<String> {
+    let ended =
+        shown.effects.iter().filter(|effect| !ends::stopped(case.bench.library, **effect, &shown.full).is_empty());
     let sentence = |effect: &usize| {
         let name = words(case.name(*effect));
         format!(
@@ -177,7 +176,7 @@ fn few(admitted: &Admitted, split: &Split) -> Option<String> {
         ],
         false => [String::new(), "each".to_owned()],
     };
-    (!split.in_turn.is_empty()).then(|| {
+    split.is_of_few().then(|| {
         format!(
             "only {commands} different commands: {in_parts}effects are chosen by all of them, and {in_turn} in turn is left out of the fit \
              that its gap is measured with; record {} more to have clips that nothing was chosen by",

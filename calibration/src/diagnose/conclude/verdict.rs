@@ -20,7 +20,7 @@ pub(super) struct Finding<'a> {
     pub(super) of_arm: bool,
     /// The gap before and after, of every group of sensors.
     pub(super) left: Vec<SensorGap>,
-    /// Whether the gap shrinks on the clips that were kept for confirming.
+    /// Whether clips speak for it by numbers that were fitted to others.
     pub(super) confirmed: bool,
     /// Whether an effect is stronger than what is plausible.
     pub(super) implausible: bool,
@@ -230,7 +230,7 @@ pub(in crate::diagnose) mod tests {
     }
 
     #[test]
-    fn what_widens_the_gap_on_clips_kept_for_confirming_is_not_named() {
+    fn what_widens_the_gap_on_held_out_clips_is_not_named() {
         let refuted = Finding { confirmed: false, ..finding(vec!["payload"], 500.0, 1.5) };
         assert_eq!(refuted.decide().kind, Kind::Unexplained);
         assert_eq!(Finding { confirmed: false, ..finding(vec!["payload"], 1.5, 1.2) }.decide().kind, Kind::None);

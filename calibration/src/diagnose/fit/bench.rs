@@ -1,7 +1,7 @@
 //! Hypotheses fitted to clips: the baseline's numbers and those of the effects that act, together, by the steps of
 //! `descend`.
 
-use super::effort::Effort;
+use super::effort::{Effort, LAST_PASS, REFINEMENT};
 use super::shortlist::{Scored, hold_numbers};
 use super::sweep::{Point, Precision, Reduced, Swept, sweep};
 use crate::diagnose::library::Library;
@@ -222,6 +222,12 @@ impl<E: Likelihood> Bench<'_, E> {
     /// The effort of a trial of a candidate: one beyond the arm leaves the joints' numbers alone.
     pub fn trying(&self, candidate: usize, effort: Effort) -> Effort {
         Effort { holds_joints: !self.library.is_of_arm(candidate), ..effort }
+    }
+
+    /// The effort of a fit to the end. Clips with an object take a simulation for each number of their own; joints one by one besides
+    /// would take too long.
+    pub fn last_pass(&self) -> Effort {
+        if self.scatter.count() == 0 { LAST_PASS } else { REFINEMENT }
     }
 
     /// `full` with the candidate as strong as the score test says, within what is plausible.

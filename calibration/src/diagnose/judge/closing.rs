@@ -13,7 +13,7 @@ pub const MIN_SHARE_CLOSED: f64 = 0.1;
 /// A gap smaller than this, over its floor, is taken for this size.
 const MIN_GAP_RATIO: f64 = 1.2;
 
-/// How much of the way is gone between two hypotheses on all clips but those for confirming, of the group of sensors in which it is
+/// How much of the way is gone between two hypotheses on the clips of a search, of the group of sensors in which it is
 /// largest; 0 where the gap widens on clips that were not fitted. `whole`: what the baseline leaves.
 pub fn closes<E: Evidence>(
     bench: &Bench<'_, E>,
@@ -30,9 +30,9 @@ pub fn closes<E: Evidence>(
         let contact = in_contact.map(|(before, after)| way(before.mean_square, after.mean_square, before.floor));
         Some(shares.chain(contact).collect())
     };
-    let (Some(open), Some(choose)) = (on(&split.open()), on(split.elsewhere())) else { return 0.0 };
+    let (Some(all), Some(choose)) = (on(&split.searched()), on(split.elsewhere())) else { return 0.0 };
     let harmless = |(_, choose): &(&f64, &f64)| **choose > -MIN_SHARE_CLOSED;
-    open.iter().zip(&choose).filter(harmless).map(|(open, _)| *open).fold(0.0, f64::max)
+    all.iter().zip(&choose).filter(harmless).map(|(all, _)| *all).fold(0.0, f64::max)
 }
 
 /// How much of the way from the gap down to noise is gone, on a logarithmic scale.

@@ -1,4 +1,4 @@
-//! What the clips kept for confirming say about what was found: whether they speak for it, and how far the gap shrinks there.
+//! What clips say about what was found by numbers that were fitted to others: whether they speak for it, and how far the gap shrinks.
 //!
 //! They speak for it where they are predicted better, and where in a clip like most a real part of the gap closes. An object that
 //! meets a corner, or misses it, ends elsewhere by more than any cause explains. So how far its path shrinks in the mean of
@@ -6,14 +6,13 @@
 
 use super::closing::MIN_SHARE_CLOSED;
 use super::gap::{Residuals, Shrunk};
-use super::held_out::Fits;
+use super::held_out::HeldOut;
 use super::remainder;
 use super::score::predict_unseen;
-use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::select::gain::Gain;
 use crate::diagnose::work::DiagnoseError;
-use inference::likelihood::{Evidence, Group};
+use inference::likelihood::Evidence;
 
 /// What they say.
 pub(in crate::diagnose) struct Confirmation {
@@ -23,21 +22,20 @@ pub(in crate::diagnose) struct Confirmation {
     pub(in crate::diagnose) shrink: Shrunk,
 }
 
-/// Compares the baseline and what was found, each with what it leaves on the clips kept for confirming; `weights` of the channels in
-/// the step in which the search began.
+/// Compares the baseline and what was found; `weights` of the channels in the step in which the search began.
 ///
 /// # Errors
 /// [`DiagnoseError::NoBaseline`] where the twin has no answer.
 pub(in crate::diagnose) fn confirm<E: Evidence>(
     bench: &Bench<'_, E>,
     weights: &[f64],
-    [without, with]: [(&Fits, &Residuals); 2],
+    both: [&HeldOut; 2],
     seed: u64,
 ) -> Result<Confirmation, DiagnoseError> {
-    let shrink = shrunk([without.1, with.1], seed);
-    let mean = mean([without.1, with.1]);
+    let left = both.map(|held_out| &held_out.left);
+    let (shrink, mean) = (left[1].shrunk(left[0], seed), mean(left));
     let holds = if bench.scatter.count() > 0 {
-        let [before, after] = [without, with].map(|(fits, _)| predict_unseen(bench, fits, weights));
+        let [before, after] = both.map(|held_out| predict_unseen(bench, &held_out.fits, weights));
         let (before, after) = before.zip(after).ok_or(DiagnoseError::NoBaseline)?;
         speaks_for(&after.over(&before), &shrink, mean)
     } else {
@@ -46,51 +44,29 @@ pub(in crate::diagnose) fn confirm<E: Evidence>(
     Ok(Confirmation { holds, shrink })
 }
 
-/// How far the gap shrinks.
-fn shrunk([before, after]: [&Residuals; 2], seed: u64) -> Shrunk {
-    Shrunk {
-        mean: after.shrink(before, seed).value,
-        usual: usual(before, after),
-        contact: contact(before, after),
-        clips: after.clips_that_shrink(before),
-    }
-}
-
 /// Whether clips with an object speak for it: more of them are predicted better than worse, in sum by more than its standard error,
 /// and enough of the gap closes: in the mean of squares, or in a clip like most.
 fn speaks_for(gain: &Gain, shrink: &Shrunk, mean: f64) -> bool {
     let better = gain.share > 0.5 && gain.nats > gain.error;
-    better && mean.max(shrink.usual).max(shrink.contact) > MIN_SHARE_CLOSED
+    better && mean.max(shrink.usual.value).max(shrink.contact.value) > MIN_SHARE_CLOSED
 }
 
 /// The same of clips of the arm alone, which have no nuisance parameters. Their likelihood is nothing but their residuals, and weighs
 /// these by what the search took for noise before anything was found: the plain residuals count, in more clips than not.
 fn shrinks_in_most(shrink: &Shrunk, mean: f64) -> bool {
     let [shrinks, all] = shrink.clips;
-    2 * shrinks > all && mean.max(shrink.usual) > MIN_SHARE_CLOSED
+    2 * shrinks > all && mean.max(shrink.usual.value) > MIN_SHARE_CLOSED
 }
 
 fn mean([before, after]: [&Residuals; 2]) -> f64 {
     remainder::explained(before.mean_square(), after.mean_square(), before.floor())
 }
 
-/// The share that is explained of what is not noise in a clip like most, in the group of sensors of which that is most.
-fn usual(before: &Residuals, after: &Residuals) -> f64 {
-    SensorGap::of_groups(&before.typical(), &after.typical()).iter().map(SensorGap::explained).fold(0.0, f64::max)
-}
-
-/// The same of the joints in contact; 0 where no tool touches anything.
-fn contact(before: &Residuals, after: &Residuals) -> f64 {
-    let [before, after] = [before, after].map(|left| left.typical_of(Group::Contact));
-    before
-        .zip(after)
-        .map_or(0.0, |(before, after)| remainder::explained(before.mean_square, after.mean_square, before.floor))
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::score::Predicted;
     use super::*;
+    use crate::answer::diagnosis::Share;
 
     /// What four clips gain by being predicted with what was found [nats].
     fn gains(gains: [f64; 4]) -> Gain {
@@ -101,8 +77,12 @@ mod tests {
         predicted(gains).over(&predicted([0.0; 4]))
     }
 
+    fn share(value: f64) -> Share {
+        Share { value, ci90: [value; 2] }
+    }
+
     fn shrink(usual: f64, contact: f64) -> Shrunk {
-        Shrunk { mean: -1.0, usual, contact, clips: [2, 4] }
+        Shrunk { mean: share(-1.0), usual: share(usual), contact: share(contact), clips: [2, 4] }
     }
 
     #[test]
@@ -125,7 +105,7 @@ mod tests {
 
     #[test]
     fn clips_without_numbers_of_their_own_confirm_by_their_residuals() {
-        let shrunk = |clips| Shrunk { clips, usual: 0.9, ..Shrunk::default() };
+        let shrunk = |clips| Shrunk { clips, usual: share(0.9), ..Shrunk::default() };
         assert!(shrinks_in_most(&shrunk([2, 2]), 0.99) && !shrinks_in_most(&shrunk([1, 2]), 0.99));
         assert!(!shrinks_in_most(&Shrunk { clips: [2, 2], ..Shrunk::default() }, 0.05), "nothing closes");
     }

@@ -1,8 +1,14 @@
 //! The gap: mean square of residuals in sigmas of the sensors, and by how much it shrinks from one hypothesis to another.
+//!
+//! A hit on a corner sends an object elsewhere by more than any cause does. So what a clip leaves in the object's poses counts up to
+//! [`MAX_OF_MEDIAN`] times what the clip in the middle does (a Winsorised mean over clips).
 
+use super::remainder;
 use crate::answer::diagnosis::Share;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
+use crate::diagnose::select::gain::MAX_OF_MEDIAN;
 use inference::likelihood::{Evidence, Group};
+use inference::statistics::median;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -43,11 +49,12 @@ impl Sum {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Shrunk {
     /// Of the mean squared residual, see [`Residuals::shrink`].
-    pub mean: f64,
-    /// Of what is not noise in a clip like most, see [`crate::answer::diagnosis::SensorGap::explained`].
-    pub usual: f64,
+    pub mean: Share,
+    /// Of what is not noise in a clip like most, see [`crate::answer::diagnosis::SensorGap::explained`]: in the group of sensors of
+    /// which that is most.
+    pub usual: Share,
     /// The same of the joints in contact; 0 where no tool touches anything.
-    pub contact: f64,
+    pub contact: Share,
     /// In how many clips it does, and of how many.
     pub clips: [usize; 2],
 }
@@ -108,8 +115,13 @@ impl Residuals {
 
     /// The same of one group; `None` where no clip has any of it.
     pub fn typical_of(&self, group: Group) -> Option<Typical> {
+        self.typical_among(&(0..self.clips.len()).collect::<Vec<_>>(), group)
+    }
+
+    /// The same among some clips, by their places.
+    fn typical_among(&self, places: &[usize], group: Group) -> Option<Typical> {
         let usual = |sums: &[Sums]| {
-            let values: Vec<f64> = sums.iter().filter_map(|clip| clip[group as usize].mean()).collect();
+            let values: Vec<f64> = places.iter().filter_map(|place| sums[*place][group as usize].mean()).collect();
             let logarithms = values.iter().map(|value| value.max(f64::MIN_POSITIVE).ln());
             (!values.is_empty()).then(|| (logarithms.sum::<f64>() / values.len() as f64).exp())
         };
@@ -128,6 +140,28 @@ impl Residuals {
         [(0..self.clips.len()).filter(falls).count(), self.clips.len()]
     }
 
+    /// How far the gap shrinks from `before` to this.
+    pub fn shrunk(&self, before: &Self, seed: u64) -> Shrunk {
+        let usual = |places: &[usize]| {
+            let of = |group| self.explained_among(before, places, group);
+            WITH_A_GAP.into_iter().filter_map(of).fold(0.0, f64::max)
+        };
+        let contact = |places: &[usize]| self.explained_among(before, places, Group::Contact).unwrap_or(0.0);
+        Shrunk {
+            mean: self.shrink(before, seed),
+            usual: over_draws(self.clips.len(), seed, usual),
+            contact: over_draws(self.clips.len(), seed, contact),
+            clips: self.clips_that_shrink(before),
+        }
+    }
+
+    /// Share of what is not noise in a clip like most of some that is gone.
+    fn explained_among(&self, before: &Self, places: &[usize], group: Group) -> Option<f64> {
+        let [before, after] = [before, self].map(|residuals| residuals.typical_among(places, group));
+        let (before, after) = before.zip(after)?;
+        Some(remainder::explained(before.mean_square, after.mean_square, before.floor))
+    }
+
     /// The shrink `1 - after / before` of the mean square from `before` to this, with an interval from drawing clips anew,
     /// or pieces of them where there are few.
     pub fn shrink(&self, before: &Self, seed: u64) -> Share {
@@ -142,17 +176,18 @@ impl Residuals {
                 [from, self, before].map(|residuals| mean(drawn.iter().map(|k| &residuals.pieces[*k])));
             ((from - after) / before.max(f64::MIN_POSITIVE)).max(SHRINK_OF_A_DOUBLED_GAP)
         };
-        let all: Vec<usize> = (0..self.pieces.len()).collect();
-        let mut rng = Pcg64::seed_from_u64(seed);
-        let mut drawn: Vec<f64> = (0..BOOTSTRAP_DRAWS)
-            .map(|_| of(&all.iter().map(|_| rng.random_range(0..all.len())).collect::<Vec<_>>()))
-            .collect();
-        drawn.sort_unstable_by(f64::total_cmp);
-        Share {
-            value: of(&all),
-            ci90: [drawn[BOOTSTRAP_DRAWS / 20], drawn[BOOTSTRAP_DRAWS - 1 - BOOTSTRAP_DRAWS / 20]],
-        }
+        over_draws(self.pieces.len(), seed, of)
     }
+}
+
+/// A share of so many clips or pieces, with its interval from drawing them anew (bootstrap).
+fn over_draws(count: usize, seed: u64, of: impl Fn(&[usize]) -> f64) -> Share {
+    let all: Vec<usize> = (0..count).collect();
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut drawn: Vec<f64> =
+        (0..BOOTSTRAP_DRAWS).map(|_| of(&all.iter().map(|_| rng.random_range(0..count)).collect::<Vec<_>>())).collect();
+    drawn.sort_unstable_by(f64::total_cmp);
+    Share { value: of(&all), ci90: [drawn[BOOTSTRAP_DRAWS / 20], drawn[BOOTSTRAP_DRAWS - 1 - BOOTSTRAP_DRAWS / 20]] }
 }
 
 /// The share by which a gap shrinks that becomes twice as large. Numbers that fit some clips may be anything in others, up
@@ -193,11 +228,19 @@ fn sums_of_noise<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Sums {
 
 /// The mean over the groups that have a gap.
 fn mean<'a>(parts: impl IntoIterator<Item = &'a Sums>) -> f64 {
-    let total = parts
-        .into_iter()
-        .fold(Sums::default(), |total, part| [0, 1, 2].map(|group: usize| total[group].with(part[group])));
-    let means: Vec<f64> = WITH_A_GAP.into_iter().filter_map(|group| total[group as usize].mean()).collect();
+    let parts: Vec<&Sums> = parts.into_iter().collect();
+    let means: Vec<f64> = WITH_A_GAP.into_iter().filter_map(|group| mean_of_group(&parts, group)).collect();
     means.iter().sum::<f64>() / means.len().max(1) as f64
+}
+
+fn mean_of_group(parts: &[&Sums], group: Group) -> Option<f64> {
+    let of_group = parts.iter().map(|part| part[group as usize]);
+    if group == Group::Arm {
+        return of_group.fold(Sum::default(), Sum::with).mean();
+    }
+    let of_clips: Vec<f64> = of_group.filter_map(Sum::mean).collect();
+    let most = MAX_OF_MEDIAN * median(of_clips.iter().copied())?;
+    Some(of_clips.iter().map(|of_clip| of_clip.min(most)).sum::<f64>() / of_clips.len() as f64)
 }
 
 #[cfg(test)]
@@ -221,6 +264,21 @@ mod tests {
     fn one_clip_that_went_its_own_way_does_not_make_the_typical_one() {
         let [typical] = residuals(&[1.0, 1.0, 1.0, 30.0]).typical()[..] else { panic!("one group") };
         assert!((typical.mean_square - 30f64.sqrt()).abs() < 1e-9 && typical.floor == 1.0, "{typical:?}");
+    }
+
+    #[test]
+    fn an_object_that_meets_a_corner_in_one_clip_does_not_decide_how_far_the_gap_shrinks() {
+        let of_object = |sizes: &[f64]| {
+            let mut residuals = residuals(sizes);
+            for sums in [&mut residuals.sums, &mut residuals.pieces, &mut residuals.floors] {
+                sums.iter_mut().for_each(|sums| sums.swap(Group::Arm as usize, Group::Object as usize));
+            }
+            residuals
+        };
+        let before = of_object(&[2.0, 2.2, 1.9, 2.1, 2.0, 1.8, 2.3, 2.0]);
+        let after = of_object(&[1.0, 1.0, 1.1, 0.9, 30.0, 1.0, 1.0, 1.0]);
+        let shrink = after.shrink(&before, 1);
+        assert!(shrink.value > 0.5 && shrink.ci90[0] > 0.2, "{shrink:?}");
     }
 
     #[test]

@@ -1,26 +1,84 @@
-//! Numbers for clips that they were not fitted to. Clips kept for confirming are seen by no fit at all; where there are too few
-//! commands to keep any, every command is left out of a fit of its own in turn, and judged by that.
+//! Numbers for clips that they were not fitted to: every command is left out of a fit to all others in turn, and judged by that.
+//!
+//! Of few commands each is left out of a fit of its own. Of many, one more or less moves the numbers little: there they are those of
+//! the fit to all, one Newton step away (the influence of the clips that are left out), which takes no simulation.
 
 use super::gap::Residuals;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::THOROUGH;
 use crate::diagnose::fit::left_out::numbers_without;
+use crate::diagnose::work::DiagnoseError;
 use inference::admit::Split;
 use inference::likelihood::Evidence;
 
 /// A hypothesis for every clip that is judged: numbers, and clips that they were not fitted to.
 pub(in crate::diagnose) type Fits = Vec<(Hypothesis, Vec<usize>)>;
 
-/// `None` where the twin has no answer without one of the commands.
+/// Numbers for clips that they were not fitted to.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) struct HeldOut {
+    pub(in crate::diagnose) fits: Fits,
+    /// What they leave there.
+    pub(in crate::diagnose) left: Residuals,
+}
+
+impl HeldOut {
+    /// `None` where the twin has no answer.
+    pub(in crate::diagnose) fn of<E: Evidence>(bench: &Bench<'_, E>, fits: Fits) -> Option<Self> {
+        Some(Self { left: Residuals::of(bench, &fits)?, fits })
+    }
+}
+
+/// A hypothesis measured on all clips.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) struct Measured {
+    /// Fitted to all of them: its numbers are the answer.
+    pub(in crate::diagnose) of_all: Hypothesis,
+    pub(in crate::diagnose) held_out: HeldOut,
+}
+
+impl Measured {
+    /// # Errors
+    /// [`DiagnoseError::NoBaseline`] where the twin has no answer without one of the commands.
+    pub(in crate::diagnose) fn of<E: Evidence>(
+        bench: &Bench<'_, E>,
+        split: &Split,
+        hypothesis: &Hypothesis,
+        weights: &[f64],
+    ) -> Result<Self, DiagnoseError> {
+        let measured = || {
+            let of_all = of_all(bench, split, hypothesis, weights)?;
+            let held_out = HeldOut::of(bench, fits(bench, split, &of_all, weights)?)?;
+            Some(Self { of_all, held_out })
+        };
+        measured().ok_or(DiagnoseError::NoBaseline)
+    }
+}
+
+/// A hypothesis fitted to all clips, from where those of the search have it.
+fn of_all<E: Evidence>(
+    bench: &Bench<'_, E>,
+    split: &Split,
+    hypothesis: &Hypothesis,
+    weights: &[f64],
+) -> Option<Hypothesis> {
+    if split.is_of_few() || bench.interrupt.asked() {
+        return Some(hypothesis.clone());
+    }
+    let (effects, full) = (&hypothesis.effects, hypothesis.full.clone());
+    bench.fit(effects, full, &split.confirm, weights, Some(hypothesis), bench.last_pass())
+}
+
+/// Numbers for every command: `hypothesis` was fitted to all. `None` where the twin has no answer without one of them.
 pub(in crate::diagnose) fn fits<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
     hypothesis: &Hypothesis,
     weights: &[f64],
 ) -> Option<Fits> {
-    if split.in_turn.is_empty() {
-        return Some(vec![(hypothesis.clone(), split.confirm.clone())]);
+    if !split.is_of_few() {
+        return Some(by_influence(bench, split, hypothesis));
     }
     let without = |out: &Vec<usize>| {
         let others: Vec<usize> = split.train.iter().copied().filter(|clip| !out.contains(clip)).collect();
@@ -30,32 +88,24 @@ pub(in crate::diagnose) fn fits<E: Evidence>(
     split.in_turn.iter().map(without).collect()
 }
 
-/// What a hypothesis leaves on clips that its numbers were not fitted to.
-pub(in crate::diagnose) fn residuals<E: Evidence>(
-    bench: &Bench<'_, E>,
-    split: &Split,
-    hypothesis: &Hypothesis,
-    weights: &[f64],
-) -> Option<Residuals> {
-    Residuals::of(bench, &fits(bench, split, hypothesis, weights)?)
+/// Numbers for every command, one Newton step away from the fit of a hypothesis where that saw the command's clips.
+fn by_influence<E: Evidence>(bench: &Bench<'_, E>, split: &Split, hypothesis: &Hypothesis) -> Fits {
+    let without = |out: &Vec<usize>| {
+        let Hypothesis { effects, free, .. } = hypothesis;
+        let full = numbers_without(bench, hypothesis, out);
+        (Hypothesis { effects: effects.clone(), full, free: free.clone(), fitted: Vec::new() }, out.clone())
+    };
+    split.in_turn.iter().map(without).collect()
 }
 
-/// The same for effects that are not named: where commands are left out in turn, its numbers are taken one Newton step away from
-/// the fit to all of them, which takes no simulation. A fit of each would be most of the work of a diagnosis.
+/// What a hypothesis of the search leaves on clips that its numbers were not fitted to, without a fit: a fit of each would be most of
+/// the work of a diagnosis.
 pub(in crate::diagnose) fn estimated<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
     hypothesis: &Hypothesis,
-    weights: &[f64],
 ) -> Option<Residuals> {
-    if split.in_turn.is_empty() {
-        return residuals(bench, split, hypothesis, weights);
-    }
-    let without = |out: &Vec<usize>| {
-        let full = numbers_without(bench, hypothesis, out);
-        (Hypothesis { full, ..hypothesis.clone() }, out.clone())
-    };
-    Residuals::of(bench, &split.in_turn.iter().map(without).collect::<Vec<_>>())
+    Residuals::of(bench, &by_influence(bench, split, hypothesis))
 }
 
 #[cfg(test)]
@@ -83,7 +133,7 @@ mod tests {
             }
             let left = Residuals::of(bench, &fits).expect("residuals");
             assert_eq!(left.clips.iter().map(|(clip, _)| *clip).collect::<Vec<_>>(), [0, 1]);
-            let near = estimated(bench, &split, &all, even).expect("residuals");
+            let near = estimated(bench, &split, &all).expect("residuals");
             let at_all = Residuals::at(bench, &all, &[0, 1]).expect("residuals");
             let [fitted, near, at_all] = [&left, &near, &at_all].map(Residuals::mean_square);
             // One step goes most of the way that fits go.

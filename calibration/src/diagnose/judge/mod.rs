@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `score` | how well it predicts clips: leave-one-clip-out log-likelihood |
 //! | `held_out` | numbers for clips that it was not fitted to |
-//! | `confirm` | whether the clips kept for confirming speak for what was found |
+//! | `confirm` | whether held-out clips speak for what was found |
 //! | `closing` | how much of the gap it closes |
 //! | `ends` | which of its sizes stopped at an end of their search |
 //! | `remainder`, `drift` | what it leaves |

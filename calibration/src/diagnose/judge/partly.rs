@@ -3,14 +3,14 @@
 //!
 //! Effects are taken in the order in which they were found. They are believed as long as each stood out on clips that were
 //! not fitted (nearly all of them, far beyond chance, no other effect half as good), and all together close a real share of the
-//! squared gap on the clips kept for confirming: the whole 90 % interval of the share lies above it. Where it does not, the
+//! squared gap on held-out clips: the whole 90 % interval of the share lies above it. Where it does not, the
 //! interval of all that the search found may: then those that are believed have to close more than half of what all of it
 //! does. Where an effect that is known to look alike does as well, it is proven that one of the two acts, and both are said. One
 //! that is stronger than what is plausible is said to be unusual: a range is what is known beforehand, and no bar for
 //! what the clips show. What comes after them in the search belongs to the rest.
 
 use super::gap::Residuals;
-use super::held_out::{self, Fits};
+use super::held_out::Measured;
 use super::trial::{Found, Step};
 use super::{confidence, remainder};
 use crate::answer::diagnosis::Share;
@@ -23,10 +23,8 @@ use inference::likelihood::Evidence;
 pub(in crate::diagnose) struct Partly {
     /// The search as if it had ended here.
     pub(in crate::diagnose) found: Found,
-    /// Its numbers for clips that they were not fitted to.
-    pub(in crate::diagnose) fits: Fits,
-    /// What they leave there.
-    pub(in crate::diagnose) after: Residuals,
+    /// It, measured on all clips.
+    pub(in crate::diagnose) measured: Measured,
     /// Share of the squared gap that it closes there.
     pub(in crate::diagnose) share: Share,
     /// Whether an effect is stronger than what is plausible.
@@ -35,8 +33,8 @@ pub(in crate::diagnose) struct Partly {
     rivals: Vec<usize>,
 }
 
-/// The most effects that are proven; `None` where not even the first is. `before`: what the baseline leaves on the clips kept
-/// for confirming; `overdispersion`: see [`Found::overdispersion`].
+/// The most effects that are proven; `None` where not even the first is. `before`: what the baseline leaves on
+/// held-out clips; `overdispersion`: see [`Found::overdispersion`].
 pub(in crate::diagnose) fn proven<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
@@ -47,8 +45,8 @@ pub(in crate::diagnose) fn proven<E: Evidence>(
 ) -> Option<Partly> {
     let all = found.last.effects.len();
     let of_all = || {
-        let left = held_out::residuals(bench, split, &found.last, &found.steps.last()?.weights)?;
-        Some(left.shrink(before, seed))
+        let all = Measured::of(bench, split, &found.last, &found.steps.last()?.weights).ok()?;
+        Some(all.held_out.left.shrink(before, seed))
     };
     let most_of = |share: &Share, all: Share| all.ci90[0] > MOST_OF_IT && share.value > MOST_OF_IT * all.value;
     let one = |count: usize| {
@@ -56,12 +54,11 @@ pub(in crate::diagnose) fn proven<E: Evidence>(
         let last = if count == all { &found.last } else { &with_effects(&found.steps, count)?.from };
         let until = Found { steps: found.steps.clone(), last: last.clone() };
         let rivals = beside_what_stands_out(bench, &until, overdispersion)?;
-        let fits = held_out::fits(bench, split, last, weights)?;
-        let after = Residuals::of(bench, &fits)?;
-        let share = after.shrink(before, seed);
-        let unusual = !remainder::implausible(bench, last).is_empty();
+        let measured = Measured::of(bench, split, last, weights).ok()?;
+        let share = measured.held_out.left.shrink(before, seed);
+        let unusual = !remainder::implausible(bench, &measured.of_all).is_empty();
         let real = share.ci90[0] > MOST_OF_IT || of_all().is_some_and(|all| most_of(&share, all));
-        real.then_some(Partly { found: until, fits, after, share, unusual, rivals })
+        real.then_some(Partly { found: until, measured, share, unusual, rivals })
     };
     (1..=all).rev().find_map(one)
 }

@@ -1,7 +1,7 @@
 //! How large the gap is in units of the hand, without effects and with what was found: joints, torques, the object.
 
 use super::gap::Residuals;
-use super::held_out::Fits;
+use super::held_out::HeldOut;
 use super::remainder;
 use super::tolerance::{self, Measured};
 use crate::answer::diagnosis::{Change, Gap, SensorGap, TorqueRms};
@@ -34,15 +34,15 @@ impl Sizes {
     /// [`DiagnoseError`] when a clip cannot be replayed.
     pub(in crate::diagnose) fn of<E: Evidence>(
         bench: &Bench<'_, E>,
-        (fits, left): ([&Fits; 2], [&Residuals; 2]),
+        both: [&HeldOut; 2],
         session: &Session,
         admitted: &Admitted,
     ) -> Result<Self, DiagnoseError> {
-        let torque_rms = torque_rms(bench.evidence, left);
+        let torque_rms = torque_rms(bench.evidence, both);
         let [joints, add, add_s] = match torque_rms {
             // Joints go where they were measured.
             Some(_) => [Change::default(); 3],
-            None => replayed(bench, fits, session, admitted)?,
+            None => replayed(bench, both, session, admitted)?,
         };
         Ok(Self { joints, add, add_s, torque_rms })
     }
@@ -77,20 +77,20 @@ impl Sizes {
 /// Whether the gap is of no interest without effects and with them.
 pub(in crate::diagnose) fn within_tolerance<E: Evidence>(
     bench: &Bench<'_, E>,
-    (fits, left): ([&Fits; 2], [&Residuals; 2]),
+    both: [&HeldOut; 2],
     session: &Session,
     admitted: &Admitted,
 ) -> Result<[bool; 2], DiagnoseError> {
     let stated = &session.cell.tolerance;
     let of = |measured: [Measured; 2]| measured.map(|measured| tolerance::holds(stated, measured));
-    if let Some(torques) = torque_rms(bench.evidence, left) {
+    if let Some(torques) = torque_rms(bench.evidence, both) {
         let Change { before, after } = torques.over_joints();
         return Ok(of([before, after].map(|torques| Measured { torques, ..Measured::default() })));
     }
     if *stated == Tolerance::default() {
         return Ok([false; 2]);
     }
-    let [joints, add, _] = replayed(bench, fits, session, admitted)?;
+    let [joints, add, _] = replayed(bench, both, session, admitted)?;
     let measured = |joints, object| Measured { joints, object, torques: None };
     Ok(of([measured(joints.before, add.before), measured(joints.after, add.after)]))
 }
@@ -111,15 +111,15 @@ fn size_in_words(torques: Option<f64>, joints: Option<f64>, add: Option<f64>) ->
 /// `twin replay`; of strokes by whoever simulates them.
 fn replayed<E: Evidence>(
     bench: &Bench<'_, E>,
-    both: [&Fits; 2],
+    both: [&HeldOut; 2],
     session: &Session,
     admitted: &Admitted,
 ) -> Result<[Change; 3], DiagnoseError> {
     let mut changes = [Change::default(); 3];
     let (engine, nominal) = (bench.evidence.engine(), setting::complete(&session.cell, None)?);
-    for (place, fits) in both.into_iter().enumerate() {
+    for (place, held_out) in both.into_iter().enumerate() {
         let mut gaps = Vec::new();
-        for (hypothesis, clips) in fits {
+        for (hypothesis, clips) in &held_out.fits {
             let theta = bench.library.theta(&hypothesis.full);
             let replays = Replays::new(&session.cell, &theta, (engine, &nominal))?;
             for clip in clips {
@@ -143,11 +143,11 @@ fn replayed<E: Evidence>(
 
 /// Root mean square of each joint's torque beyond the predicted one at two hypotheses [N m]; `None` where torques are no channel
 /// of their own.
-fn torque_rms(evidence: &impl Evidence, both: [&Residuals; 2]) -> Option<TorqueRms> {
+fn torque_rms(evidence: &impl Evidence, both: [&HeldOut; 2]) -> Option<TorqueRms> {
     let sigma = evidence.torque_sigma()?;
-    let [before, after] = both.map(|residuals| {
+    let [before, after] = both.map(|held_out| {
         let of = |(channel, sigma): (usize, &f64)| {
-            let rows = residuals.clips.iter().flat_map(|(clip, values)| evidence.rows(*clip).iter().zip(values));
+            let rows = held_out.left.clips.iter().flat_map(|(clip, values)| evidence.rows(*clip).iter().zip(values));
             let squares: Vec<f64> = rows
                 .filter(|(row, _)| row.channel == channel)
                 .map(|(_, residual)| (residual * sigma).powi(2))

@@ -83,7 +83,7 @@ pub struct Step {
     pub weights: Vec<f64>,
     /// How many residuals of the arm the judged clips have.
     pub arm_rows: usize,
-    /// What the hypothesis that is extended leaves on all clips but those for confirming.
+    /// What the hypothesis that is extended leaves on the clips of the search.
     pub left: Vec<Typical>,
     /// What the baseline leaves on them.
     pub whole: Vec<Typical>,

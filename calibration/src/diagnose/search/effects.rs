@@ -5,7 +5,7 @@
 //! is fitted to that program itself.
 
 use super::again::{by_engine, found_by_engine, reconsidered, rivals_refitted, without_the_best};
-use super::refit::{fewer, last_pass, refitted};
+use super::refit::{fewer, refitted};
 use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
 use crate::diagnose::fit::anchored::Anchored;
@@ -162,13 +162,13 @@ fn begun<E: Evidence>(
     first: Option<&Step>,
 ) -> Option<Step> {
     let (bench, split) = (search.bench, search.split);
-    let effort = if from.effects.is_empty() { REFINEMENT } else { last_pass(bench) };
+    let effort = if from.effects.is_empty() { REFINEMENT } else { bench.last_pass() };
     let from = search.onwards(from, &weights, effort)?;
     let predicted = predict(bench, &from, &split.choose, &weights)?;
-    let left = Residuals::at(bench, &from, &split.open()).map(|left| left.typical()).unwrap_or_default();
+    let left = Residuals::at(bench, &from, &split.searched()).map(|left| left.typical()).unwrap_or_default();
     let whole = first.map_or_else(|| left.clone(), |first| first.whole.clone());
     let of_arm = |row: &&Row| bench.evidence.channels()[row.channel].group == Group::Arm;
-    let arm_rows = split.open().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum();
+    let arm_rows = split.searched().iter().map(|clip| bench.evidence.rows(*clip).iter().filter(of_arm).count()).sum();
     Some(Step { from, predicted, trials: Vec::new(), weights, arm_rows, left, whole })
 }
 

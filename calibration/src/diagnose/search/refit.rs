@@ -1,7 +1,7 @@
 //! The end of each step of the search: what was chosen is fitted to the end, and what it makes superfluous is dropped.
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::effort::{Effort, LAST_PASS, REFINEMENT};
+use crate::diagnose::fit::effort::REFINEMENT;
 use crate::diagnose::fit::multi_start::cheapest;
 use crate::diagnose::judge::score::predict;
 use crate::diagnose::library::Alternative;
@@ -20,8 +20,8 @@ pub(super) fn refitted<E: Evidence>(search: &Search<'_, E>, fit: &Hypothesis, we
     let (bench, fits) = (search.bench, search.fits(&fit.effects, weights, fit));
     let ways = [Some(fit.full.clone()), other_way(bench, fit)];
     let anew = ways.iter().flatten().filter_map(|full| (search.refined)(full));
-    let best = fits.best(anew.chain([fit.full.clone()]), last_pass(bench))?;
-    let scanned = scanned(bench, &best, weights).and_then(|full| fits.fit(full, last_pass(bench)));
+    let best = fits.best(anew.chain([fit.full.clone()]), bench.last_pass())?;
+    let scanned = scanned(bench, &best, weights).and_then(|full| fits.fit(full, bench.last_pass()));
     cheapest([Some(best), scanned].into_iter().flatten())
 }
 
@@ -71,12 +71,6 @@ fn other_way<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis) -> Option<Vec<
     Some(full)
 }
 
-/// The effort of a fit to the end. Clips with an object take a simulation for each number of their own; joints one by one
-/// besides would take too long.
-pub fn last_pass<E: Evidence>(bench: &Bench<'_, E>) -> Effort {
-    if bench.scatter.count() == 0 { LAST_PASS } else { REFINEMENT }
-}
-
 /// A hypothesis without the first of its effects that the others make superfluous.
 pub(super) fn fewer<E: Evidence>(search: &Search<'_, E>, now: &Hypothesis, weights: &[f64]) -> Option<Hypothesis> {
     let bench = search.bench;
@@ -101,6 +95,7 @@ pub(super) fn fewer<E: Evidence>(search: &Search<'_, E>, now: &Hypothesis, weigh
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::fit::effort::Effort;
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{on_bench, shipped, truth, with_effect};

@@ -61,6 +61,7 @@ impl Criteria {
     pub fn proves(&self, gain: &Gain, cost: usize) -> bool {
         let agree = self.min_agreeing_clips.is_some_and(|least| gain.clips() >= least && gain.in_nearly_all());
         let by_chance = if self.by_student { gain.by_chance() } else { gain.twice_its_error() };
-        gain.nats > self.price(cost) && gain.share > self.min_share && (agree || gain.nats > by_chance)
+        let no_chance = agree || gain.nats > by_chance || gain.is_no_chance_by_ranks();
+        gain.nats > self.price(cost) && gain.share > self.min_share && no_chance
     }
 }

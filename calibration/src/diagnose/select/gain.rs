@@ -2,9 +2,9 @@
 
 use inference::statistics::{median, student_sigmas};
 
-/// A clip's gain or loss counts up to so many times that of its session's clip in the middle (a choice): no clip decides alone, and none
-/// makes what all the others say uncertain.
-const MAX_OF_MEDIAN: f64 = 5.0;
+/// What a clip gains, or leaves, counts up to so many times that of its session's clip in the middle (a choice): no clip decides alone,
+/// and none makes what all the others say uncertain.
+pub const MAX_OF_MEDIAN: f64 = 5.0;
 /// What chance makes of a gain, or of a slope, reaches so many standard errors, were these known exactly: 2.3 % of a normal distribution lie above.
 pub const CHANCE_SIGMAS: f64 = 2.0;
 /// Models are worth the same that differ by less [nats]: a likelihood ratio of 55. Nats count less than they say, since twins are never
@@ -79,6 +79,22 @@ impl Gain {
         CHANCE_SIGMAS * self.error
     }
 
+    /// Whether more clips gain than lose, and by more, beyond chance (Wilcoxon 1945, "Individual comparisons by ranking methods": the
+    /// signed-rank test in its normal approximation). What one clip gains counts by its rank alone, so that clips whose gains differ
+    /// widely are no reason to doubt what they say alike.
+    pub fn is_no_chance_by_ranks(&self) -> bool {
+        let (mut beyond, mut variance) = (0.0, 0.0);
+        for gains in &self.sessions {
+            let mut sorted = gains.clone();
+            sorted.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
+            let count = sorted.len() as f64;
+            let ranks = sorted.iter().enumerate().filter(|(_, gain)| **gain > 0.0).map(|(place, _)| (place + 1) as f64);
+            beyond += ranks.sum::<f64>() - count * (count + 1.0) / 4.0;
+            variance += count * (count + 1.0) * (2.0 * count + 1.0) / 24.0;
+        }
+        beyond > CHANCE_SIGMAS * f64::sqrt(variance)
+    }
+
     /// Whether the models may be worth the same; differences count `overdispersion` times less than they say.
     pub fn may_be_none(&self, overdispersion: f64) -> bool {
         self.nats / overdispersion < SAME_WORTH_NATS.max(self.by_chance() / overdispersion)
@@ -115,6 +131,17 @@ mod tests {
             let gain = Gain { error: 1.0, ..Gain::of(vec![vec![1.0; clips]], SAME_WORTH_NATS) };
             assert!((gain.by_chance() / quantile - 1.0).abs() < 0.04, "{clips}: {}", gain.by_chance());
         }
+    }
+
+    #[test]
+    fn ranks_tell_what_clips_of_unequal_weight_say_alike() {
+        let most = [3.0, 9.0, 2.0, 40.0, 7.0, 55.0, 1.0, 12.0, 60.0, 4.0, 30.0, 8.0, 2.5, -3.5, -1.5, -20.0];
+        let gain = Gain::of(vec![most.to_vec()], SAME_WORTH_NATS);
+        assert!(gain.is_no_chance_by_ranks(), "13 of 16, and the large ones");
+        let half = most.map(|gain| if gain > 10.0 { -gain } else { gain });
+        assert!(!Gain::of(vec![half.to_vec()], SAME_WORTH_NATS).is_no_chance_by_ranks());
+        assert!(!Gain::of(vec![vec![5.0; 4]], SAME_WORTH_NATS).is_no_chance_by_ranks(), "four are too few");
+        assert!(Gain::of(vec![vec![5.0; 4]; 2], SAME_WORTH_NATS).is_no_chance_by_ranks());
     }
 
     #[test]

@@ -133,8 +133,11 @@ fn remedies(diagnosis: &Diagnosis) -> Markup {
 
 fn origin(diagnosis: &Diagnosis) -> Markup {
     let clips = &diagnosis.clips;
-    let used =
-        [("fitted to", &clips.train), ("chosen on", &clips.choose), ("held out: gap and shrink", &clips.confirm)];
+    let used = [
+        ("fitted to", &clips.train),
+        ("chosen on", &clips.choose),
+        ("held out in turn: gap and shrink", &clips.confirm),
+    ];
     html! {
         section {
             h2 { "Where this comes from" }
