@@ -200,8 +200,21 @@ pub struct Gap {
     pub object_add_m: Change,
     /// Mean ADD-S [m].
     pub object_add_s_m: Change,
+    /// The same of the clip in the middle.
+    pub median: Medians,
     /// The gap of each kind of sensor by itself.
     pub sensors: Vec<SensorGap>,
+}
+
+/// Medians over clips: a hit on a corner decides none of them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct Medians {
+    /// Of the root mean square over joints and time [rad].
+    pub joint_rms_rad: Change,
+    /// Of ADD [m].
+    pub object_add_m: Change,
+    /// Of ADD-S [m].
+    pub object_add_s_m: Change,
 }
 
 /// The gap of one kind of sensor: mean squares of residuals in units of their noise, in a clip like most (the geometric mean over

@@ -39,8 +39,8 @@ mod test_likelihood;
 mod work;
 
 pub use crate::answer::diagnosis::{
-    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Remedy, Rest, SensorGap,
-    Sensors, Share, StageTest, Status, TorqueRms, Verdict,
+    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Medians, Nearest, NextMotion, Place, Remedy, Rest,
+    SensorGap, Sensors, Share, StageTest, Status, TorqueRms, Verdict,
 };
 
 pub use work::{DiagnoseError, Options, peaks};

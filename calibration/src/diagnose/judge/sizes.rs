@@ -4,7 +4,7 @@ use super::gap::Residuals;
 use super::held_out::HeldOut;
 use super::remainder;
 use super::tolerance::{self, Measured};
-use crate::answer::diagnosis::{Change, Gap, SensorGap, TorqueRms};
+use crate::answer::diagnosis::{Change, Gap, Medians, SensorGap, TorqueRms};
 use crate::diagnose::work::DiagnoseError;
 
 use crate::diagnose::fit::bench::Bench;
@@ -12,10 +12,13 @@ use crate::words::in_unit;
 use inference::admit::Admitted;
 use inference::likelihood::object::Replays;
 use inference::likelihood::{Evidence, setting};
+use inference::statistics::median;
 use shared_mem::cell::Tolerance;
 use shared_mem::recording::Session;
+use twin::replay;
 
 /// Figures on held-out clips.
+#[derive(Default)]
 pub(in crate::diagnose) struct Sizes {
     /// Root mean square over joints and time [rad].
     pub(in crate::diagnose) joints: Change,
@@ -23,6 +26,7 @@ pub(in crate::diagnose) struct Sizes {
     pub(in crate::diagnose) add: Change,
     /// Mean ADD-S [m].
     add_s: Change,
+    median: Medians,
     /// Root mean square of each joint's torque beyond the predicted one [N m], along the measured motion.
     torque_rms: Option<TorqueRms>,
 }
@@ -38,13 +42,11 @@ impl Sizes {
         session: &Session,
         admitted: &Admitted,
     ) -> Result<Self, DiagnoseError> {
-        let torque_rms = torque_rms(bench.evidence, both);
-        let [joints, add, add_s] = match torque_rms {
+        match torque_rms(bench.evidence, both) {
             // Joints go where they were measured.
-            Some(_) => [Change::default(); 3],
-            None => replayed(bench, both, session, admitted)?,
-        };
-        Ok(Self { joints, add, add_s, torque_rms })
+            Some(torque_rms) => Ok(Self { torque_rms: Some(torque_rms), ..Self::default() }),
+            None => Self::replayed(bench, both, session, admitted),
+        }
     }
 
     /// Without effects and with them; `of_object`: most of the gap is the object's.
@@ -54,6 +56,38 @@ impl Sizes {
             size_in_words(torques.before, self.joints.before, self.add.before.filter(|_| of_object)),
             size_in_words(torques.after, self.joints.after, self.add.after.filter(|_| of_object)),
         ]
+    }
+
+    /// Of clips at two hypotheses by the code of `twin replay`; of strokes by whoever simulates them.
+    fn replayed<E: Evidence>(
+        bench: &Bench<'_, E>,
+        both: [&HeldOut; 2],
+        session: &Session,
+        admitted: &Admitted,
+    ) -> Result<Self, DiagnoseError> {
+        let [before, after] = both.map(|held_out| replayed(bench, held_out, session, admitted));
+        let (before, after) = (before?, after?);
+        let change = |of: &dyn Fn(&[replay::Gap]) -> Option<f64>| Change { before: of(&before), after: of(&after) };
+        let mean = |of: fn(&replay::Gap) -> Option<f64>| {
+            change(&|gaps| {
+                let all: Vec<f64> = gaps.iter().filter_map(of).collect();
+                (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+            })
+        };
+        let middle = |of: fn(&replay::Gap) -> Option<f64>| change(&|gaps| median(gaps.iter().filter_map(of)));
+        let squares = mean(mean_square_of_joints);
+        let rms = |gap: &replay::Gap| mean_square_of_joints(gap).map(f64::sqrt);
+        Ok(Self {
+            joints: Change { before: squares.before.map(f64::sqrt), after: squares.after.map(f64::sqrt) },
+            add: mean(|gap| gap.object_add_m),
+            add_s: mean(|gap| gap.object_add_s_m),
+            median: Medians {
+                joint_rms_rad: middle(rms),
+                object_add_m: middle(|gap| gap.object_add_m),
+                object_add_s_m: middle(|gap| gap.object_add_s_m),
+            },
+            torque_rms: None,
+        })
     }
 
     /// With the gap in sigmas: what two hypotheses leave.
@@ -69,6 +103,7 @@ impl Sizes {
             torque_rms: self.torque_rms,
             object_add_m: self.add,
             object_add_s_m: self.add_s,
+            median: self.median,
             sensors,
         }
     }
@@ -90,7 +125,7 @@ pub(in crate::diagnose) fn within_tolerance<E: Evidence>(
     if *stated == Tolerance::default() {
         return Ok([false; 2]);
     }
-    let [joints, add, _] = replayed(bench, both, session, admitted)?;
+    let Sizes { joints, add, .. } = Sizes::replayed(bench, both, session, admitted)?;
     let measured = |joints, object| Measured { joints, object, torques: None };
     Ok(of([measured(joints.before, add.before), measured(joints.after, add.after)]))
 }
@@ -107,38 +142,29 @@ fn size_in_words(torques: Option<f64>, joints: Option<f64>, add: Option<f64>) ->
     }
 }
 
-/// Mean joint error, ADD and ADD-S of the confirm clips at two hypotheses, each with numbers that were not fitted to them, by the code of
-/// `twin replay`; of strokes by whoever simulates them.
+/// What every clip leaves at numbers that were not fitted to it.
 fn replayed<E: Evidence>(
     bench: &Bench<'_, E>,
-    both: [&HeldOut; 2],
+    held_out: &HeldOut,
     session: &Session,
     admitted: &Admitted,
-) -> Result<[Change; 3], DiagnoseError> {
-    let mut changes = [Change::default(); 3];
+) -> Result<Vec<replay::Gap>, DiagnoseError> {
     let (engine, nominal) = (bench.evidence.engine(), setting::complete(&session.cell, None)?);
-    for (place, held_out) in both.into_iter().enumerate() {
-        let mut gaps = Vec::new();
-        for (hypothesis, clips) in &held_out.fits {
-            let theta = bench.library.theta(&hypothesis.full);
-            let replays = Replays::new(&session.cell, &theta, (engine, &nominal))?;
-            for clip in clips {
-                let (_, _, report) = replays.replay(admitted.clips[*clip].clone())?;
-                gaps.push(report.gap);
-            }
-        }
-        let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
-        let squares = gaps.iter().filter_map(|gap| gap.joint_rms_rad.as_ref()).flatten().map(|rms| rms * rms).collect();
-        let figures = [
-            mean(squares).map(f64::sqrt),
-            mean(gaps.iter().filter_map(|gap| gap.object_add_m).collect()),
-            mean(gaps.iter().filter_map(|gap| gap.object_add_s_m).collect()),
-        ];
-        for (change, figure) in changes.iter_mut().zip(figures) {
-            if place == 0 { change.before = figure } else { change.after = figure }
+    let mut gaps = Vec::new();
+    for (hypothesis, clips) in &held_out.fits {
+        let replays = Replays::new(&session.cell, &bench.library.theta(&hypothesis.full), (engine, &nominal))?;
+        for clip in clips {
+            let (_, _, report) = replays.replay(admitted.clips[*clip].clone())?;
+            gaps.push(report.gap);
         }
     }
-    Ok(changes)
+    Ok(gaps)
+}
+
+/// Over joints and time [rad^2].
+fn mean_square_of_joints(gap: &replay::Gap) -> Option<f64> {
+    let rms = gap.joint_rms_rad.as_ref()?;
+    Some(rms.iter().map(|rms| rms * rms).sum::<f64>() / rms.len() as f64)
 }
 
 /// Root mean square of each joint's torque beyond the predicted one at two hypotheses [N m]; `None` where torques are no channel

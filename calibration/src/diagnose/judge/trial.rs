@@ -16,7 +16,7 @@ use inference::likelihood::Evidence;
 /// An effect on the arm must be worth more than this for each of its residuals [nats]: there are so many that the least numerics add up.
 pub(in crate::diagnose) const MIN_NATS_PER_ROW: f64 = 0.0025;
 /// Of one that closes so much of the gap, and predicts nearly all clips better, one that it predicts worse does not matter.
-pub(in crate::diagnose) const LARGE_SHARE_CLOSED: f64 = 0.3;
+pub(in crate::diagnose) const LARGE_SHARE_CLOSED: f64 = 0.2;
 /// A gain of so many of its standard errors is no chance.
 const NO_CHANCE_SIGMAS: f64 = 3.5;
 /// An effect that leads is worth this share more than others: two effects of nearly the same worth do the same.
@@ -158,6 +158,14 @@ impl Step {
             if let Some(predicted) = predict(bench, &fit, &split.choose, &self.weights) {
                 let closes = closes(bench, split, &self.whole, [&self.from, &fit]);
                 let gain = predicted.over(&self.predicted);
+                let name = bench.library.name(fit.effects.last().copied().unwrap_or_default());
+                let ranks = gain.rank_sigmas();
+                tracing::debug!(
+                    "{name}: {:.0} +- {:.0} nats, {:.0} % of clips, ranks {ranks:.1} sigma, closes {closes:.2}",
+                    gain.nats,
+                    gain.error,
+                    100.0 * gain.share
+                );
                 let trial = &mut self.trials[place];
                 (trial.closes, trial.fitted) = (closes, Some((fit, gain)));
             }

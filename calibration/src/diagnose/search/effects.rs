@@ -7,7 +7,7 @@
 use super::again::{by_engine, found_by_engine, reconsidered, rivals_refitted, without_the_best};
 use super::refit::{fewer, refitted};
 use crate::answer::diagnosis::SensorGap;
-use crate::diagnose::criteria::JOINTS_EXCESS_BESIDE_A_CAUSE;
+use crate::diagnose::criteria::{JOINTS_EXCESS_BESIDE_A_CAUSE, OBJECT_EXCESS};
 use crate::diagnose::fit::anchored::Anchored;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT, SCREENING};
@@ -120,7 +120,8 @@ fn is_spent<E: Evidence>(search: &Search<'_, E>, first: &Step, now: &Hypothesis)
         |hypothesis| Residuals::at(search.bench, hypothesis, search.split.elsewhere()).map(|left| left.typical());
     let (Some(before), Some(after)) = (typical(&first.from), typical(now)) else { return false };
     SensorGap::of_groups(&before, &after).iter().all(|left| {
-        left.after - left.floor <= JOINTS_EXCESS_BESIDE_A_CAUSE.value.max(NUMERICS_OF_GAP * (left.before - left.floor))
+        let numerics = if left.of_object() { OBJECT_EXCESS } else { JOINTS_EXCESS_BESIDE_A_CAUSE };
+        left.after - left.floor <= numerics.value.max(NUMERICS_OF_GAP * (left.before - left.floor))
     })
 }
 

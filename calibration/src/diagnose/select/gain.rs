@@ -83,6 +83,11 @@ impl Gain {
     /// signed-rank test in its normal approximation). What one clip gains counts by its rank alone, so that clips whose gains differ
     /// widely are no reason to doubt what they say alike.
     pub fn is_no_chance_by_ranks(&self) -> bool {
+        self.rank_sigmas() > CHANCE_SIGMAS
+    }
+
+    /// How many standard errors the sum of the ranks of the clips that gain lies above what chance makes of it.
+    pub fn rank_sigmas(&self) -> f64 {
         let (mut beyond, mut variance) = (0.0, 0.0);
         for gains in &self.sessions {
             let mut sorted = gains.clone();
@@ -92,7 +97,7 @@ impl Gain {
             beyond += ranks.sum::<f64>() - count * (count + 1.0) / 4.0;
             variance += count * (count + 1.0) * (2.0 * count + 1.0) / 24.0;
         }
-        beyond > CHANCE_SIGMAS * f64::sqrt(variance)
+        beyond / variance.sqrt().max(f64::MIN_POSITIVE)
     }
 
     /// Whether the models may be worth the same; differences count `overdispersion` times less than they say.

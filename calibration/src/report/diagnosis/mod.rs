@@ -170,7 +170,9 @@ fn clip_list(clips: &[String]) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::answer::diagnosis::{Candidate, Change, Clips, Gap, Nearest, Place, Remedy, Share, Status, Verdict};
+    use crate::answer::diagnosis::{
+        Candidate, Change, Clips, Gap, Medians, Nearest, Place, Remedy, Share, Status, Verdict,
+    };
     use crate::answer::{Size, Trace};
     use shared_mem::recording::SessionFiles;
     use shared_mem::theta::Theta;
@@ -221,6 +223,7 @@ pub(super) mod tests {
                 torque_rms: None,
                 object_add_m: Change { before: Some(0.0139), after: Some(0.0012) },
                 object_add_s_m: Change::default(),
+                median: Medians::default(),
                 sensors: Vec::new(),
             },
             nearest: None,
