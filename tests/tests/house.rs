@@ -55,7 +55,7 @@ const FLOORS: &[&[&str]] = &[
     &["inference/kept"],
     &["inference/engine", "inference/estimate"],
     &["inference/likelihood"],
-    &["inference/admit", "inference/controller", "inference/object_fit"],
+    &["inference/admit", "inference/controller", "inference/object_fit", "inference/witness"],
     &["calibration/words"],
     &["calibration/answer"],
     &["calibration/identify/error"],

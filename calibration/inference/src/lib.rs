@@ -9,6 +9,7 @@
 //! | [`estimate`] | fits over clips: what all clips share, what varies from clip to clip |
 //! | [`likelihood`] | what the twin makes of recorded clips: residuals, and what varies from clip to clip |
 //! | [`object_fit`] | an object's parameters fitted to clips of rough hits |
+//! | [`witness`] | what a stage of a clip says of an effect by itself, without a roll-out |
 //! | [`interrupt`] | cancellation, pause and time budget |
 //! | [`kept`] | checkpoints of a computation |
 //! | [`seed`] | what is drawn is drawn from it |
@@ -46,5 +47,6 @@ pub mod likelihood;
 pub mod object_fit;
 pub mod seed;
 pub mod statistics;
+pub mod witness;
 
 pub use shared_mem::interrupt;

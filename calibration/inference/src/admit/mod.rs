@@ -27,7 +27,7 @@ mod split;
 #[cfg(test)]
 mod test_cell;
 #[cfg(test)]
-mod test_clip;
+pub(crate) mod test_clip;
 #[cfg(test)]
 mod test_object;
 pub mod torques;

@@ -10,7 +10,7 @@ use std::path::Path;
 use twin::arm::ArmModel;
 
 /// `q` gives the joint [rad] at a stamp [s].
-pub(super) fn of_one_joint(stamps_ns: Vec<u64>, q: impl Fn(f64) -> f64) -> Clip {
+pub(crate) fn of_one_joint(stamps_ns: Vec<u64>, q: impl Fn(f64) -> f64) -> Clip {
     let q = stamps_ns.iter().map(|ns| q(seconds_between(0, *ns))).collect();
     let series = JointSeries { stamps_ns, dof: 1, q, dq: Vec::new(), tau: Vec::new() };
     Clip {

@@ -20,7 +20,7 @@ const MAY_TOUCH: f64 = 0.02;
 const STRIDE_ROWS: usize = 4;
 
 /// An object moves that is seen so far from where it stood [m]: beyond the noise of trackers.
-const SEEN_MOTION: f64 = 6e-3;
+pub const SEEN_MOTION: f64 = 6e-3;
 /// Before the object is seen to move, the tool has touched it already for at most this long [ns].
 const TOUCH_MARGIN_NS: u64 = 60_000_000;
 

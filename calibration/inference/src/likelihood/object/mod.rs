@@ -30,7 +30,7 @@ mod rollout;
 mod rows;
 mod simulator;
 
-pub use clearance::{Clearance, alone_until};
+pub use clearance::{Clearance, SEEN_MOTION, alone_until};
 pub use nuisance::{IDENTIFIED, Nuisance, diagnosed, random_effects};
 pub use replayed::Replays;
 pub use rows::{Channel, Part, Row};
