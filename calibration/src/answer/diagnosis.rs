@@ -4,6 +4,7 @@ use super::{Size, Trace};
 use capture::arm_motion::ArmMotion;
 use capture::rate::RATE;
 use inference::engine::Used;
+use inference::witness::Witness;
 use shared_mem::recording::SessionFiles;
 use shared_mem::theta::Theta;
 use std::collections::BTreeMap;
@@ -20,6 +21,9 @@ pub struct Diagnosis {
     /// Whose the object's gap is, where an arm hits it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stage_test: Option<StageTest>,
+    /// What single stages of strokes say by themselves, without a roll-out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub witnesses: Vec<Witness>,
     /// Where it lies; shares sum to 1 over everything that was measured.
     #[serde(rename = "where")]
     pub places: Vec<Place>,

@@ -6,12 +6,15 @@
 //! | [`diagnosis`] | where a gap lies, what causes it, what to do about it |
 //! | `size` | a parameter of an effect with its interval |
 //! | `trace` | what is left between robot and twin over a clip |
+//! | `witness` | what a stage says by itself, in words |
 
 pub mod diagnosis;
 pub mod identification;
 mod size;
 mod trace;
+mod witness;
 
 pub use size::{Size, effect_in_words};
 pub(crate) use size::{numbers, one_or_list};
 pub use trace::Trace;
+pub use witness::{witness_in_words, witnessed_number};

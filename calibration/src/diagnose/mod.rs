@@ -201,6 +201,7 @@ impl Question for Cause<'_> {
             let baseline = bench.library.theta(&found.steps[0].from.full);
             concluded.stage_test = judge::recorded_arm::stage_test(&session.cell, &baseline, admitted, &split.confirm)?;
         }
+        conclude::witnessed::add(&mut concluded, &session.cell, admitted);
         if bench.interrupt.spent() {
             concluded.budget_spent = true;
             concluded.verdict = concluded.verdict.so_far(options.budget.unwrap_or_default(), cut_short);

@@ -5,6 +5,7 @@ use super::diagnosis::{confidence, has_effects, is_known, sizes, together, verdi
 use super::identification;
 use crate::answer::diagnosis::{Candidate, Diagnosis, Kind, Status, TorqueRms};
 use crate::answer::identification::{Identification, Parameter};
+use crate::answer::witness_in_words;
 use crate::benchmark::calibrate::Regenerated;
 use crate::benchmark::score::{Method, Scores};
 use crate::diagnose::against::{Candidate as Compared, Comparison, change};
@@ -70,6 +71,8 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
         lines.push(others(&diagnosis.candidates));
     }
     lines.extend(diagnosis.stage_test.iter().map(|test| format!("arm or object: {}", test.text)));
+    let shown = diagnosis.witnesses.iter().filter(|witness| witness.is_significant());
+    lines.extend(shown.map(|witness| format!("{} alone: {}", witness.stage, witness_in_words(witness))));
     lines.extend(diagnosis.warnings.iter().map(|warning| format!("note: {warning}")));
     if !diagnosis.next_experiment.is_empty() {
         lines.push(format!("next clip: {}", diagnosis.next_experiment));

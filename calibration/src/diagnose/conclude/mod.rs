@@ -11,6 +11,7 @@
 //! | `remedies` | what to do about what was named |
 //! | `ranked`, `reason` | what is said of every candidate, and why |
 //! | `say` | the answer |
+//! | `witnessed` | what single stages say beside the verdict |
 
 pub mod advice;
 mod decide;
@@ -22,6 +23,7 @@ mod remedies;
 mod say;
 pub mod site;
 mod verdict;
+pub(in crate::diagnose) mod witnessed;
 pub mod written;
 
 pub use say::not_testable;

@@ -209,7 +209,13 @@ mod tests {
                 let group = |of_object, mean_square| Typical { mean_square, floor: 1.5, of_object };
                 step.left = vec![group(false, arm), group(true, 100.0)];
                 step.whole = step.left.clone();
-                let search = Search { bench, split: &split, refined: &anew, bar: &Progress::new("nothing", 1) };
+                let search = Search {
+                    bench,
+                    split: &split,
+                    refined: &anew,
+                    witnessed: &|_| Vec::new(),
+                    bar: &Progress::new("nothing", 1),
+                };
                 object(super::fitted(&search, &step, &[0], false, 0))
             };
             assert_eq!(fitted(1.5), library.with_object_of(hidden.clone(), &wrong), "the arm is where it was");
@@ -227,7 +233,7 @@ mod tests {
             let asked = ["base_tilt", "joint_encoder_offset"].map(|name| library.find(name).expect("a candidate"));
             let (step, split) = step(bench, hidden_baseline(library, &world), even, &asked);
             let bar = &Progress::new("nothing", 1);
-            let search = Search { bench, split: &split, refined: &|_| None, bar };
+            let search = Search { bench, split: &split, refined: &|_| None, witnessed: &|_| Vec::new(), bar };
             let found = fitted(&search, &step, &[0, 1], false, 0);
             let [(1, fit)] = &found[..] else { panic!("{} fits", found.len()) };
             let sizes = &library.candidates[asked[1]].sizes;
@@ -247,7 +253,7 @@ mod tests {
             let candidate = library.find("joint_backlash").expect("a candidate");
             let (step, split) = step(bench, hidden_baseline(library, &world), even, &[candidate]);
             let bar = &Progress::new("nothing", 1);
-            let search = Search { bench, split: &split, refined: &|_| None, bar };
+            let search = Search { bench, split: &split, refined: &|_| None, witnessed: &|_| Vec::new(), bar };
             let found = fitted(&search, &step, &[0], true, 0);
             let [(0, fit)] = &found[..] else { panic!("{} fits", found.len()) };
             assert_eq!(fit.effects, [candidate]);

@@ -29,6 +29,8 @@ pub(in crate::diagnose) struct Search<'a, E> {
     pub(in crate::diagnose) split: &'a Split,
     /// Numbers whose object is found anew under the effects in them; `None` where there is no object.
     pub(in crate::diagnose) refined: &'a dyn Fn(&[f64]) -> Option<Vec<f64>>,
+    /// Candidates that single stages show beyond the effects in these numbers.
+    pub(in crate::diagnose) witnessed: &'a dyn Fn(&[f64]) -> Vec<usize>,
     pub(in crate::diagnose) bar: &'a Progress,
 }
 
@@ -56,7 +58,7 @@ impl<'a, E> Search<'a, E> {
 
     /// The same on another bench of the same clips.
     pub(in crate::diagnose) fn on<F>(&self, bench: &'a Bench<'a, F>) -> Search<'a, F> {
-        Search { bench, split: self.split, refined: self.refined, bar: self.bar }
+        Search { bench, split: self.split, refined: self.refined, witnessed: self.witnessed, bar: self.bar }
     }
 }
 

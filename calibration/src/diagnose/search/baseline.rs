@@ -19,6 +19,7 @@ use inference::likelihood::object::ObjectClips;
 use inference::likelihood::setting::{complete, object_parameters};
 use inference::likelihood::{Evidence, Likelihood, Settings};
 use inference::object_fit::fit_object;
+use inference::witness;
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
@@ -109,7 +110,22 @@ impl<E: Evidence> Baseline<'_, E> {
             let step = self.bench.step("refined").with(&self.split.train).with_numbers(full);
             self.bench.trail.0.once(&step, || self.with_object_refined(full))
         };
-        effects::search(&Search { bench: self.bench, split: self.split, refined: &refined, bar }, baseline)
+        let witnessed = |full: &[f64]| self.witnessed(full);
+        let search = Search { bench: self.bench, split: self.split, refined: &refined, witnessed: &witnessed, bar };
+        effects::search(&search, baseline)
+    }
+
+    /// Candidates that single stages show beyond the effects in these numbers.
+    fn witnessed(&self, full: &[f64]) -> Vec<usize> {
+        if !self.admitted.with_object {
+            return Vec::new();
+        }
+        let all = witness::beyond(self.cell, &self.admitted.clips, &self.bench.library.theta(full));
+        let shown = all.iter().filter(|witness| witness.is_significant());
+        let mut found: Vec<usize> = shown.filter_map(|witness| self.bench.library.find(witness.effect)).collect();
+        found.sort_unstable();
+        found.dedup();
+        found
     }
 }
 

@@ -139,6 +139,9 @@ fn tried<E: Evidence>(search: &Search<'_, E>, from: &Hypothesis, first: Option<&
         }
     }
     let own_numbers = bench.scatter.count() > 0;
+    // What a stage shows by itself is fitted whatever slopes of roll-outs say.
+    let others: Vec<usize> = scored.iter().map(|s| s.candidate).filter(|other| !promising.contains(other)).collect();
+    promising.extend((search.witnessed)(&step.from.full).into_iter().filter(|shown| others.contains(shown)));
     let trials = scored.into_iter().map(|scored| Trial { scored, fitted: None, closes: 0.0, own_numbers }).collect();
     let step = fitted(search, Step { trials, ..step }, &promising, false);
     if step.best(bench).is_some() {

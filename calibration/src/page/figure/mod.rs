@@ -5,6 +5,7 @@ pub(crate) mod calibration_curve;
 pub(crate) mod chart;
 pub(crate) mod forest;
 pub(crate) mod matrix;
+pub(crate) mod regression;
 pub(crate) mod scatter;
 mod shares;
 pub(crate) mod where_map;

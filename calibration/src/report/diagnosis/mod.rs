@@ -2,6 +2,7 @@
 
 mod candidates;
 mod gap;
+mod witnesses;
 
 pub(super) use candidates::sizes;
 pub(super) use gap::is_known;
@@ -30,6 +31,7 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         @if let Some(test) = &diagnosis.stage_test {
             section { h2 { "The arm's, or the object's" } p { (test.text) } }
         }
+        (witnesses::section(&diagnosis.witnesses))
         @if !diagnosis.traces.is_empty() { (residuals(diagnosis)) }
         @if !diagnosis.candidates.is_empty() { (candidates::sections(&diagnosis.candidates)) }
         @if !diagnosis.remedies.is_empty() { (remedies(diagnosis)) }
@@ -228,6 +230,7 @@ pub(super) mod tests {
             },
             nearest: None,
             stage_test: None,
+            witnesses: Vec::new(),
             places: vec![Place {
                 stage: "control".into(),
                 channel: "joint2".into(),
