@@ -10,6 +10,7 @@
 
 use super::corrected::Corrected;
 use super::regression::{Regression, Sample, regress};
+use super::reported::Off;
 use super::{Axis, FEWEST_CLIPS, SHARED_SHARE_OF_NOISE, Shown, Witness};
 use crate::likelihood::object::{SEEN_MOTION, noise_of};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -149,7 +150,7 @@ fn shown(numbers: Vec<Shown>, samples: &[Sample], found: &Regression, scale: &[f
         return Vec::new();
     }
     let witness = |(k, number): (usize, Shown)| {
-        (found.errors[k] < NARROWED * scale[k]).then(|| number.of(STAGE, k, samples, found))
+        if found.errors[k] < NARROWED * scale[k] { number.of(STAGE, k, samples, found) } else { None }
     };
     let all = numbers.into_iter().enumerate().filter_map(witness);
     all.filter(|witness| witness.clips >= FEWEST_CLIPS).collect()
@@ -186,10 +187,10 @@ const GAP: Axis = Axis { name: "gap that is seen while they touch", unit: "m" };
 
 fn shown_of_camera() -> Vec<Shown> {
     let shift = |number, name| Shown {
-        effect: "camera_extrinsic_translation",
+        off: Off::Shift,
         number,
         unit: "m",
-        confusable_with: &["tool_offset", "joint_encoder_offset", "camera_scale"],
+        alike: &[Off::Tip, Off::Encoders, Off::Scale],
         against: Axis { name, unit: "1" },
         measured: GAP,
         turned: false,
@@ -198,19 +199,19 @@ fn shown_of_camera() -> Vec<Shown> {
         shift("translation along x", "share of the push along x"),
         shift("translation along y", "share of the push along y"),
         Shown {
-            effect: "camera_extrinsic_rotation",
+            off: Off::Turn,
             number: "rotation about z",
             unit: "rad",
-            confusable_with: &[],
+            alike: &[],
             against: Axis { name: "lever of the push about the middle", unit: "m" },
             measured: GAP,
             turned: false,
         },
         Shown {
-            effect: "camera_scale",
+            off: Off::Scale,
             number: "scale",
             unit: "1",
-            confusable_with: &[],
+            alike: &[],
             against: Axis { name: "way of the touch from the middle, along the push", unit: "m" },
             measured: GAP,
             turned: false,
@@ -221,10 +222,10 @@ fn shown_of_camera() -> Vec<Shown> {
 
 fn latency() -> Shown {
     Shown {
-        effect: "camera_latency",
+        off: Off::Late,
         number: "latency",
         unit: "s",
-        confusable_with: &["tracker_smoothing"],
+        alike: &[],
         against: Axis { name: "speed of the push", unit: "m/s" },
         measured: Axis { name: "how deep the tool seems to be in the object", unit: "m" },
         turned: true,
@@ -233,10 +234,10 @@ fn latency() -> Shown {
 
 fn shown_of_tool() -> Vec<Shown> {
     let offset = |number, name| Shown {
-        effect: "tool_offset",
+        off: Off::Tip,
         number,
         unit: "m",
-        confusable_with: &["joint_encoder_offset"],
+        alike: &[Off::Encoders],
         against: Axis { name, unit: "1" },
         measured: GAP,
         turned: false,

@@ -1,7 +1,8 @@
 //! Clips as they would have been recorded without the effects on camera, tool and encoders that are given. An effect that moves what a
 //! stage measures in another way (friction, gains) is none of its business.
 
-use nalgebra::{Isometry3, Translation3};
+use super::reported::Off;
+use nalgebra::{Isometry3, Translation3, Vector3};
 use shared_mem::cell::Cell;
 use shared_mem::msg::joints_from;
 use shared_mem::recording::{Clip, JointSeries};
@@ -45,20 +46,17 @@ pub(super) fn corrected(cell: &Cell, clip: &Clip, known: &Theta) -> Option<Corre
     let arm = ArmModel::from_cell(cell).ok()?;
     let effects = Effects::from_theta(&known.effects, arm.dof()).ok()?;
     let clip = in_model_order(clip.clone(), &arm).ok().filter(|clip| !clip.measured.is_empty())?;
-    let numbers = |effect: &str, parameter: &str| {
-        let block = known.effects.iter().find(|block| block.name == effect);
-        block.and_then(|block| block.numbers(parameter)).unwrap_or_default()
-    };
-    let offset = numbers("tool_offset", "offset");
-    let tool = <[f64; 3]>::try_from(offset).map_or_else(|_| Translation3::identity(), Translation3::from);
-    let offsets = numbers("joint_encoder_offset", "offset");
-    // One number stands for all joints.
-    let encoder_offset =
-        if let [one] = offsets[..] { [one; std::mem::size_of::<Joints>() / 8] } else { joints_from(&offsets) };
+    let shift = |sum: Vector3<f64>, by: Vec<f64>| sum + Vector3::from_iterator(by.into_iter().chain([0.0; 3]).take(3));
+    let tool = Off::Tip.known(known).into_iter().fold(Vector3::zeros(), shift);
+    let mut encoder_offset: Joints = joints_from(&[]);
+    for offsets in Off::Encoders.known(known) {
+        // One number stands for all joints.
+        let of_joint = |joint: usize| offsets.get(joint).or(offsets.first()).copied().unwrap_or(0.0);
+        (0..arm.dof()).for_each(|joint| encoder_offset[joint] += of_joint(joint));
+    }
     // A tracker that follows at a constant speed is behind by its time constant.
-    let smoothing = numbers("tracker_smoothing", "time_constant").first().map_or(0, |seconds| (seconds * 1e9) as u64);
-    let late_ns = effects.camera.latency_ns() + smoothing;
+    let late_ns = (1e9 * Off::Late.known(known).into_iter().flatten().sum::<f64>()) as u64;
     let poses = clip.object.poses.iter().map(|pose| effects.camera.undistorted(&pose.isometry())).collect();
     let stamps_ns = clip.object.stamps_ns.iter().map(|stamp| stamp.saturating_sub(late_ns)).collect();
-    Some(Corrected { stamps_ns, poses, measured: clip.measured, encoder_offset, tool })
+    Some(Corrected { stamps_ns, poses, measured: clip.measured, encoder_offset, tool: tool.into() })
 }

@@ -7,11 +7,13 @@
 //! | [`rest`] | the object stands: how far it leans and how high it is |
 //! | [`contact`] | the tool pushes the object: the gap that is seen between two that touch |
 //! | `regression` | least squares over rows of clips, clips being the units |
+//! | `reported` | in which ways reports may be off, and the effects of each |
 //! | `corrected` | clips as they would have been recorded without effects that are given |
 
 pub mod contact;
 mod corrected;
 mod regression;
+mod reported;
 pub mod rest;
 #[cfg(test)]
 mod test_witness;
@@ -19,6 +21,7 @@ mod test_witness;
 use corrected::{Corrected, corrected};
 use rayon::prelude::*;
 use regression::{Regression, Sample};
+use reported::Off;
 use serde::Serialize;
 use shared_mem::cell::{Cell, ClipKind};
 use shared_mem::recording::Clip;
@@ -53,7 +56,7 @@ pub struct Witness {
     /// How many clips it comes from.
     pub clips: usize,
     /// Effects that would show in this stage in the same way.
-    pub confusable_with: &'static [&'static str],
+    pub confusable_with: Vec<&'static str>,
     /// What to draw it over.
     pub against: Axis,
     /// What was measured.
@@ -88,10 +91,12 @@ impl Witness {
 
 /// A number of a regression that is shown.
 struct Shown {
-    effect: &'static str,
+    /// What it is a number of.
+    off: Off,
     number: &'static str,
     unit: &'static str,
-    confusable_with: &'static [&'static str],
+    /// What would show in the same way.
+    alike: &'static [Off],
     against: Axis,
     measured: Axis,
     /// Whether both axes are turned round, so that what grows with the effect points up.
@@ -100,7 +105,7 @@ struct Shown {
 
 impl Shown {
     /// The witness of number `k` of a regression over samples.
-    fn of(self, stage: &'static str, k: usize, samples: &[Sample], found: &Regression) -> Witness {
+    fn of(self, stage: &'static str, k: usize, samples: &[Sample], found: &Regression) -> Option<Witness> {
         let (value, error) = (found.values[k], found.errors[k]);
         let sign = if self.turned { -1.0 } else { 1.0 };
         let means = found.by_clip(samples, k);
@@ -111,9 +116,24 @@ impl Shown {
         };
         // Of a regressor that is turned round the slope stays.
         let points: Vec<[f64; 2]> = means.into_iter().enumerate().map(point).collect();
-        let Self { effect, number, unit, confusable_with, against, measured, .. } = self;
+        let Self { off, number, unit, alike, against, measured, .. } = self;
+        let mut effects = off.effects().chain(alike.iter().flat_map(|other| other.effects()));
+        let (effect, confusable_with) = (effects.next()?, effects.collect());
         let (clips, t) = (points.len(), value / error);
-        Witness { effect, number, stage, value, error, t, unit, clips, confusable_with, against, measured, points }
+        Some(Witness {
+            effect,
+            number,
+            stage,
+            value,
+            error,
+            t,
+            unit,
+            clips,
+            confusable_with,
+            against,
+            measured,
+            points,
+        })
     }
 }
 

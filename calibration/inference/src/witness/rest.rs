@@ -8,6 +8,7 @@
 
 use super::corrected::Corrected;
 use super::regression::{Sample, regress};
+use super::reported::Off;
 use super::{Axis, CLIPS, FEWEST_CLIPS, SHARED_SHARE_OF_NOISE, Shown, Witness};
 use crate::likelihood::object::{SEEN_MOTION, noise_of};
 use nalgebra::{Isometry3, Vector3};
@@ -46,14 +47,14 @@ pub(super) fn witnesses(cell: &Cell, clips: &[Corrected]) -> Vec<Witness> {
         };
         let samples: Vec<Sample> = poses.iter().map(of).collect();
         let found = regress(&samples, &[PLAUSIBLE_ROTATION], 1, SHARED_SHARE_OF_NOISE * noise.rotation)?;
-        Some(about.of(STAGE, 0, &samples, &found))
+        about.of(STAGE, 0, &samples, &found)
     };
     let height = || {
         let table = cell.table.as_ref()?.height + half_extents.z;
         let samples = heights(&poses, table);
         let scale = [PLAUSIBLE_SHIFT, PLAUSIBLE_ROTATION, PLAUSIBLE_ROTATION];
         let found = regress(&samples, &scale, 3, SHARED_SHARE_OF_NOISE * noise.position)?;
-        Some(shift_along_z().of(STAGE, 0, &samples, &found))
+        shift_along_z().of(STAGE, 0, &samples, &found)
     };
     let [x, y] = ["rotation about x", "rotation about y"].map(rotation);
     let all = [lean(0, x), lean(1, y), height()];
@@ -62,10 +63,10 @@ pub(super) fn witnesses(cell: &Cell, clips: &[Corrected]) -> Vec<Witness> {
 
 fn rotation(number: &'static str) -> Shown {
     Shown {
-        effect: "camera_extrinsic_rotation",
+        off: Off::Turn,
         number,
         unit: "rad",
-        confusable_with: &[],
+        alike: &[],
         against: CLIPS,
         measured: Axis { name: "lean of the object at rest", unit: "rad" },
         turned: false,
@@ -74,10 +75,10 @@ fn rotation(number: &'static str) -> Shown {
 
 fn shift_along_z() -> Shown {
     Shown {
-        effect: "camera_extrinsic_translation",
+        off: Off::Shift,
         number: "translation along z",
         unit: "m",
-        confusable_with: &["camera_scale"],
+        alike: &[Off::Scale],
         against: CLIPS,
         measured: Axis { name: "height of the object at rest above where it stands", unit: "m" },
         turned: false,

@@ -90,7 +90,7 @@ mod tests {
             t: value / 1e-3,
             unit: "s",
             clips: 8,
-            confusable_with: &["tracker_smoothing"],
+            confusable_with: vec!["tracker_smoothing"],
             against: CLIPS,
             measured: CLIPS,
             points: Vec::new(),

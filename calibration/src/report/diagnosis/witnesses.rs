@@ -66,7 +66,7 @@ mod tests {
             t,
             unit: "s",
             clips: 2,
-            confusable_with: &["tracker_smoothing"],
+            confusable_with: vec!["tracker_smoothing"],
             against: Axis { name: "speed of the push", unit: "m/s" },
             measured: Axis { name: "how deep", unit: "m" },
             points: vec![[0.1, 1e-4 * t], [0.2, 2e-4 * t]],
