@@ -285,7 +285,15 @@ fn under(recorded: Controller, kind: ControllerKind, warnings: &mut Vec<String>)
         "the first clip says controller `{name}`, and --controller `{}`: its gains are left out, what its motors are like stays",
         kind.name().unwrap_or("of no name")
     ));
-    let Controller { rotor_inertia, torque_limit, voltage_limit, torque_constant, torque_sensing, .. } = recorded;
+    let Controller {
+        rotor_inertia,
+        torque_limit,
+        voltage_limit,
+        torque_constant,
+        torque_sensing,
+        between_commands,
+        ..
+    } = recorded;
     Controller {
         kind,
         rotor_inertia,
@@ -293,6 +301,7 @@ fn under(recorded: Controller, kind: ControllerKind, warnings: &mut Vec<String>)
         voltage_limit,
         torque_constant,
         torque_sensing,
+        between_commands,
         ..Controller::default()
     }
 }

@@ -32,6 +32,7 @@ pub(super) const BLOCKS: [(&str, &[(&str, &str)]); 13] = [
             ("voltage_limit", "[60, 60, 60, 60, 9, 9, 9]"),
             ("torque_constant", "[12.1, 12.1, 12.1, 12.1, 4.2, 4.2, 4.2]"),
             ("torque_sensing", "\"motor\""),
+            ("between_commands", "\"held\""),
         ],
     ),
     ("tool", &[("mass", "0.25"), ("length", "0.16"), ("radius", "0.012")]),

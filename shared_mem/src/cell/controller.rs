@@ -44,6 +44,42 @@ pub struct Controller {
     /// Where logged torques are measured.
     #[serde(default, skip_serializing_if = "TorqueSensing::is_joint")]
     pub torque_sensing: TorqueSensing,
+    /// What the law is given between two rows of a log of commands that is slower than its 1 kHz; left out where it is not known:
+    /// `identify arm` and `diagnose` find which fits.
+    #[serde(default, skip_serializing_if = "BetweenCommands::is_unstated")]
+    pub between_commands: BetweenCommands,
+}
+
+/// What a controller at 1 kHz is given between two rows of a slower log of its commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BetweenCommands {
+    /// Not known; simulated as `held`. Not for cell.toml: it is what a missing key means.
+    #[default]
+    #[serde(skip_deserializing)]
+    Unstated,
+    /// The newest row: commands came at the log's rate.
+    Held,
+    /// The straight line between both rows.
+    Line,
+    /// The cubic through the four nearest rows: commands came at 1 kHz and the log has some of them.
+    Smooth,
+}
+
+impl BetweenCommands {
+    fn is_unstated(&self) -> bool {
+        *self == Self::Unstated
+    }
+
+    /// Its name in cell.toml; `None` where it is not known.
+    pub fn name(self) -> Option<&'static str> {
+        match self {
+            Self::Unstated => None,
+            Self::Held => Some("held"),
+            Self::Line => Some("line"),
+            Self::Smooth => Some("smooth"),
+        }
+    }
 }
 
 /// Where the torques of a log are measured.

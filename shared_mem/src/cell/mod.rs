@@ -17,7 +17,7 @@ mod wrench;
 
 pub use background::Background;
 pub use camera::{Camera, CameraPose, Intrinsics};
-pub use controller::{Controller, ControllerKind, TorqueSensing};
+pub use controller::{BetweenCommands, Controller, ControllerKind, TorqueSensing};
 pub use gripper::{Gripper, GripperModel};
 pub use object::{Object, PoseNoise, RootHold, Support};
 pub use ranges::{Range, Ranges};

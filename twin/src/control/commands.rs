@@ -1,6 +1,7 @@
 //! A recorded command series, laid out for the control loop.
 
 use crate::arm::{Joints, MAX_JOINTS};
+use shared_mem::cell::{BetweenCommands, Cell};
 use shared_mem::msg::joints_from;
 use shared_mem::recording::JointSeries;
 use shared_mem::statistics::usual_step_ns;
@@ -9,11 +10,13 @@ use shared_mem::time::TICK_NS;
 /// A log at most this far apart is the control loop's own: a missing row was lost on its way to the log, not to the
 /// robot [ns].
 const CONTROL_RATE_NS: u64 = 1_500_000;
+/// Rows further away than so many steps between two others say nothing of what lies between those [1]: a choice.
+const FAR_ROWS: f64 = 3.0;
 /// So many usual steps without a command are a hole: what the robot was commanded in there cannot be guessed.
 const HOLE_STEPS: u64 = 20;
 
-/// Commands over time. The newest one is held, as a servo holds it between packets; single rows that a 1 kHz log lost
-/// are filled in on the straight line between their neighbours.
+/// Commands over time. The newest one is held, as a servo holds it between packets, unless it is said that they went on between the
+/// rows of a slower log; single rows that a 1 kHz log lost are filled in on the straight line between their neighbours.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommandTrack {
     stamps_ns: Vec<u64>,
@@ -37,6 +40,15 @@ impl CommandTrack {
     /// Desired velocities that were not logged are the difference to the command before: what a controller can do
     /// that is given positions alone.
     pub fn new(desired: &JointSeries) -> Option<Self> {
+        Self::going_on(desired, BetweenCommands::Held)
+    }
+
+    /// The same for the controller of a cell, which may be given more than the rows of a slow log.
+    pub fn of_cell(desired: &JointSeries, cell: &Cell) -> Option<Self> {
+        Self::going_on(desired, cell.controller.as_ref().map_or_else(Default::default, |law| law.between_commands))
+    }
+
+    fn going_on(desired: &JointSeries, between: BetweenCommands) -> Option<Self> {
         if desired.is_empty() {
             return None;
         }
@@ -44,8 +56,18 @@ impl CommandTrack {
         let q_d: Vec<Joints> = rows.clone().map(|i| joints_from(desired.q_row(i))).collect();
         let stamps_ns = desired.stamps_ns.clone();
         let logged = rows.map(|i| desired.dq_row(i).map(joints_from)).collect::<Option<Vec<_>>>();
+        let known = logged.is_some();
         let dq_d = logged.unwrap_or_else(|| differences(&stamps_ns, &q_d));
-        Some(Self { stamps_ns, q_d, dq_d, holes: Vec::new() }.filled())
+        let mut track = Self { stamps_ns, q_d, dq_d, holes: Vec::new() }.filled(between);
+        if !known && is_slow(&desired.stamps_ns) && goes_on(between) {
+            track.dq_d = differences(&track.stamps_ns, &track.q_d);
+        }
+        Some(track)
+    }
+
+    /// Whether a log of commands leaves open what a controller at 1 kHz was given between its rows.
+    pub fn is_open_between(desired: &JointSeries) -> bool {
+        is_slow(&desired.stamps_ns)
     }
 
     /// Stretches too long to fill or to hold through.
@@ -53,8 +75,9 @@ impl CommandTrack {
         &self.holes
     }
 
-    fn filled(self) -> Self {
+    fn filled(self, between: BetweenCommands) -> Self {
         let Some(usual) = usual_step_ns(&self.stamps_ns) else { return self };
+        let slow = is_slow(&self.stamps_ns);
         let mut out = Self { stamps_ns: Vec::new(), q_d: Vec::new(), dq_d: Vec::new(), holes: Vec::new() };
         for row in 0..self.stamps_ns.len() {
             out.push(self.stamps_ns[row], self.q_d[row], self.dq_d[row]);
@@ -63,19 +86,48 @@ impl CommandTrack {
             let step = next_ns - from_ns;
             if step > HOLE_STEPS * usual {
                 out.holes.push(Hole { from_ns, to_ns: next_ns });
-            } else if usual <= CONTROL_RATE_NS {
-                let missing = (step + usual / 2) / usual;
+            } else if !slow || goes_on(between) {
+                let apart = if slow { TICK_NS } else { usual };
+                let missing = (step + apart / 2) / apart;
                 for k in 1..missing {
-                    let share = k as f64 / missing as f64;
-                    let blend = |a: &Joints, b: &Joints| std::array::from_fn(|i| a[i] + (b[i] - a[i]) * share);
-                    let stamp_ns = from_ns + step * k / missing;
-                    let (q_d, dq_d) =
-                        (blend(&self.q_d[row], &self.q_d[row + 1]), blend(&self.dq_d[row], &self.dq_d[row + 1]));
-                    out.push(stamp_ns, q_d, dq_d);
+                    let shares = if slow && between == BetweenCommands::Smooth {
+                        self.cubic(row, k as f64 / missing as f64)
+                    } else {
+                        [0.0, 1.0 - k as f64 / missing as f64, k as f64 / missing as f64, 0.0]
+                    };
+                    out.push(
+                        from_ns + step * k / missing,
+                        self.mixed(&self.q_d, row, shares),
+                        self.mixed(&self.dq_d, row, shares),
+                    );
                 }
             }
         }
         out
+    }
+
+    /// Shares of the rows `row - 1` to `row + 2` in the cubic through them, at a share of the step from `row` to the next (Lagrange);
+    /// the straight line at either end and beside a hole.
+    fn cubic(&self, row: usize, share: f64) -> [f64; 4] {
+        let stamp = |row: usize| self.stamps_ns.get(row).copied();
+        let steps = [row.checked_sub(1).and_then(stamp), stamp(row), stamp(row + 1), stamp(row + 2)];
+        let line = [0.0, 1.0 - share, share, 0.0];
+        let [Some(before_ns), Some(from_ns), Some(to_ns), Some(after_ns)] = steps else { return line };
+        let step = (to_ns - from_ns) as f64;
+        if (from_ns - before_ns).max(after_ns - to_ns) as f64 > FAR_ROWS * step {
+            return line;
+        }
+        let at = [-((from_ns - before_ns) as f64) / step, 0.0, 1.0, 1.0 + (after_ns - to_ns) as f64 / step];
+        std::array::from_fn(|i| {
+            let others = (0..at.len()).filter(|j| *j != i);
+            others.map(|j| (share - at[j]) / (at[i] - at[j])).product()
+        })
+    }
+
+    /// Values of the rows `row - 1` to `row + 2` in these shares; a row that has none need not be there.
+    fn mixed(&self, values: &[Joints], row: usize, shares: [f64; 4]) -> Joints {
+        let near = (0..shares.len()).filter(|k| shares[*k] != 0.0).map(|k| (shares[k], &values[row + k - 1]));
+        near.fold([0.0; MAX_JOINTS], |sum, (share, value)| std::array::from_fn(|i| sum[i] + share * value[i]))
     }
 
     fn push(&mut self, stamp_ns: u64, q_d: Joints, dq_d: Joints) {
@@ -113,6 +165,15 @@ impl CommandTrack {
     pub fn dq_d(&self, row: usize) -> &Joints {
         &self.dq_d[row]
     }
+}
+
+/// Whether a log has fewer rows than the control loop has periods.
+fn is_slow(stamps_ns: &[u64]) -> bool {
+    usual_step_ns(stamps_ns).is_some_and(|usual| usual > CONTROL_RATE_NS)
+}
+
+fn goes_on(between: BetweenCommands) -> bool {
+    matches!(between, BetweenCommands::Line | BetweenCommands::Smooth)
 }
 
 fn differences(stamps_ns: &[u64], q: &[Joints]) -> Vec<Joints> {
@@ -163,6 +224,30 @@ mod tests {
     fn velocities_that_were_not_logged_are_differences() {
         let track = track(&[0, 2, 4]);
         assert_eq!([0, 1, 2].map(|row| track.dq_d(row)[0]), [0.0, 1000.0, 1000.0]);
+    }
+
+    #[test]
+    fn commands_of_a_slow_log_go_on_between_its_rows_where_that_is_said() {
+        let ms = [0, 4, 8, 12, 16];
+        let stamps_ns: Vec<u64> = ms.iter().map(|ms| 5_000_000_000 + ms * TICK_NS).collect();
+        let cube = |ms: f64| 1e-3 * ms.powi(3);
+        let q: Vec<f64> = ms.iter().map(|ms| cube(*ms as f64)).collect();
+        let desired = JointSeries { stamps_ns, dof: 1, dq: q.clone(), q, ..JointSeries::default() };
+        let at = |between, us| in_force(&CommandTrack::going_on(&desired, between).expect("rows"), us);
+        for (ms, held) in [(4.0, 4.0), (5.0, 4.0), (7.0, 4.0), (8.0, 8.0), (11.0, 8.0)] {
+            let us = (ms * 1e3) as u64;
+            let line = cube(held) + (cube(held + 4.0) - cube(held)) * (ms - held) / 4.0;
+            assert_eq!(at(BetweenCommands::Held, us), cube(held));
+            assert!((at(BetweenCommands::Line, us) - line).abs() < 1e-12);
+            assert!((at(BetweenCommands::Smooth, us) - cube(ms)).abs() < 1e-12, "{ms}");
+        }
+        // Velocities that were not logged are the slope of what was filled in.
+        let bare = CommandTrack::going_on(&JointSeries { dq: Vec::new(), ..desired.clone() }, BetweenCommands::Line);
+        let bare = bare.expect("rows");
+        assert!((bare.dq_d(6)[0] - 1e3 * (cube(8.0) - cube(4.0)) / 4.0).abs() < 1e-6);
+        // A log of the control loop itself leaves nothing open.
+        let fast = JointSeries { stamps_ns: desired.stamps_ns.iter().map(|ns| ns / 4).collect(), ..desired };
+        assert_eq!(CommandTrack::going_on(&fast, BetweenCommands::Smooth), CommandTrack::new(&fast));
     }
 
     #[test]

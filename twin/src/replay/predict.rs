@@ -166,7 +166,8 @@ impl Replayer {
 
     fn with_arm(&self, clip: &Clip, object: Option<&ObjectState>) -> Result<Prediction, ReplayError> {
         let arm = self.rollout.arm().ok_or_else(|| ReplayError::NoArm(name(clip)))?;
-        let commands = CommandTrack::new(&clip.desired).ok_or_else(|| ReplayError::NoCommands(name(clip)))?;
+        let commands =
+            CommandTrack::of_cell(&clip.desired, &self.cell).ok_or_else(|| ReplayError::NoCommands(name(clip)))?;
         let (stamps_ns, poses_ns) = (&clip.measured.stamps_ns, &clip.object.stamps_ns);
         let start_state = |row: usize| {
             let state = arm.start_state(&clip.measured, row, &commands);

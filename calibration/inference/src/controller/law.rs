@@ -54,7 +54,7 @@ fn under(cell: &Cell, kind: ControllerKind) -> Cell {
 }
 
 /// Root mean square of what the best gains leave, over the encoders' noise; `None` where the arm cannot follow under this law.
-fn left_under(
+pub(super) fn left_under(
     cell: &Cell,
     clips: &[Clip],
     given: Option<&Theta>,
@@ -83,56 +83,9 @@ fn sentence(kind: ControllerKind, left: &[(ControllerKind, f64)]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_swing::{CELL, clip};
     use super::*;
-    use shared_mem::recording::{JointSeries, ObjectSeries};
     use std::path::Path;
-    use twin::arm::{ArmModel, JointState};
-    use twin::control::{ArmRollout, CommandTrack};
-
-    const CELL: &str =
-        "[robot]\njoints = [\"a\"]\n[controller]\nstiffness = [30.0]\ndamping = [3.0]\nrotor_inertia = [0.4]\n";
-
-    /// What a joint does under a law that is commanded a sum of swings, with gains that are not those of cell.toml.
-    fn clip(cell: &Cell, faster: f64) -> Clip {
-        let arm = ArmModel::from_cell(cell).expect("a joint");
-        let theta = shared_mem::theta::ArmTheta { stiffness: vec![33.0], damping: vec![2.8] };
-        let law = twin::arm::ControlLaw::new(cell.controller.as_ref(), Some(&theta), &arm).expect("gains");
-        let stamps_ns: Vec<u64> = (1..=3000).map(|tick| tick * 1_000_000).collect();
-        let swing = |stamp: &u64, of: fn(f64) -> f64, power: i32| -> f64 {
-            let t = *stamp as f64 * 1e-9;
-            [2.0, 5.0, 9.0].iter().map(|w| w * faster).map(|w| 0.1 * w.powi(power) * of(w * t)).sum()
-        };
-        let desired = JointSeries {
-            dof: 1,
-            q: stamps_ns.iter().map(|stamp| swing(stamp, f64::sin, 0)).collect(),
-            dq: stamps_ns.iter().map(|stamp| swing(stamp, f64::cos, 1)).collect(),
-            tau: Vec::new(),
-            stamps_ns: stamps_ns.clone(),
-        };
-        let commands = CommandTrack::new(&desired).expect("commands");
-        let rollout = ArmRollout { arm: &arm, nominal: &arm, law: &law, effects: None, parts: 1 };
-        let mut states = vec![JointState::default(); stamps_ns.len()];
-        rollout.run(&JointState::default(), stamps_ns[0], &commands, &stamps_ns, &mut states);
-        let noise = |row: usize| 1e-5 * (1e4 * row as f64).sin();
-        let measured = JointSeries {
-            q: states.iter().enumerate().map(|(row, state)| state.q[0] + noise(row)).collect(),
-            dq: Vec::new(),
-            ..desired.clone()
-        };
-        Clip {
-            others: Vec::new(),
-            file: "swing.mcap".into(),
-            kind: shared_mem::cell::ClipKind::Excitation,
-            joint_names: vec!["a".into()],
-            desired,
-            measured,
-            torques_end_at_rows: true,
-            origins: shared_mem::origin::Origins::default(),
-            object: ObjectSeries::default(),
-            warnings: Vec::new(),
-            damage: None,
-        }
-    }
 
     #[test]
     fn the_law_that_led_an_arm_is_found_and_said() {
@@ -140,7 +93,7 @@ mod tests {
         // A joint that carries nothing tells no servo from one whose weight is compensated.
         for kind in LAWS.into_iter().filter(|kind| *kind != ControllerKind::CompensatedPd) {
             let led = under(&unstated, kind);
-            let clips = [clip(&led, 1.0), clip(&led, 1.7)];
+            let clips = [clip(&led, 1.0, 1), clip(&led, 1.7, 1)];
             let (cell, said) =
                 found(&unstated, &clips, None, &Interrupt::default()).expect("an answer").expect("a law");
             let name = kind.name().expect("a law of a robot");

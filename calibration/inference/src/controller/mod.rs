@@ -3,13 +3,17 @@
 //!
 //! | module | owns |
 //! |---|---|
+//! | `between` | what the law is given between two commands of a slow log |
 //! | `law` | which control law leads the arm |
 //! | `measured_stiffness` | what logged torques say of the stiffness |
 //! | [`start`] | where the search begins when little is known |
 
+mod between;
 mod law;
 mod measured_stiffness;
 pub mod start;
+#[cfg(test)]
+mod test_swing;
 
 use crate::engine::Engine;
 use crate::estimate::{ClipModel as _, Fit, Impossible, Schedule, Unknown, fit};
@@ -34,7 +38,7 @@ pub enum ControllerError {
     Impossible(#[from] Impossible),
 }
 
-/// The cell with what its clips say of the controller: the law where it is not stated, and the stiffness where torques tell it.
+/// The cell with what its clips say of the controller: the law and what it is given between commands where they are not stated, and the stiffness where torques tell it.
 /// `given`: parameters that are known already; then gains are not looked for. `remarks`: one sentence for each that was found.
 ///
 /// # Errors
@@ -48,6 +52,10 @@ pub fn controlled(
 ) -> Result<Cell, ControllerError> {
     // The law first: what torque a spring makes is read by it.
     if let Some((led, remark)) = law::found(&cell, clips, given, interrupt)? {
+        cell = led;
+        remarks.push(remark);
+    }
+    if let Some((led, remark)) = between::found(&cell, clips, given, interrupt)? {
         cell = led;
         remarks.push(remark);
     }

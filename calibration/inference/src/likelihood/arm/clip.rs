@@ -1,7 +1,7 @@
 //! One recorded clip, prepared for being held against the twin: joints in the model's order, stretches that can be
 //! simulated, rows that are averaged, joints that are dead. Stamps of the recording, SI.
 
-use super::velocity;
+use super::{stamps, velocity};
 use crate::likelihood::object::noise_of;
 use crate::statistics::extent;
 use shared_mem::cell::{Cell, ClipKind};
@@ -101,6 +101,8 @@ pub struct ArmClip {
     pub(super) given: Option<JointSeries>,
     /// What a reader has to know, one sentence each.
     pub warnings: Vec<String>,
+    /// How uncertain the time of a row is, one sigma [s].
+    pub(super) jitter: f64,
     /// Bins of a witness; 0 where the whole clip is one.
     pub(super) stretch: usize,
     /// Stretches of one clock and without a hole in the commands, from stamp to stamp [ns].
@@ -127,6 +129,7 @@ impl ArmClip {
         if recorded.desired.is_empty() {
             return Err(ArmClipError::NoCommands);
         }
+        let evened = stamps::evened(&mut recorded);
         let step_ns = usual_step(&recorded.measured.stamps_ns);
         let rate = 1e9 / step_ns as f64;
         if rate < MIN_RATE {
@@ -142,8 +145,9 @@ impl ArmClip {
         }
         let given = dead.contains(&true).then(|| recorded.desired.clone());
         hold_dead(&mut recorded, &dead);
-        let commands = CommandTrack::new(&recorded.desired).ok_or(ArmClipError::NoCommands)?;
+        let commands = CommandTrack::of_cell(&recorded.desired, cell).ok_or(ArmClipError::NoCommands)?;
         let mut warnings = warnings(&recorded, &commands, &dead);
+        warnings.extend(evened);
         if velocity::late_in(&recorded.measured).is_some() {
             // What the filter did is no gap of the twin; the positions say the same without it.
             recorded.measured.dq.clear();
@@ -176,6 +180,7 @@ impl ArmClip {
         let seconds = rows.len() as f64 / rate;
         let stretches = (seconds / WITNESS_DURATION).round().max(1.0) as usize;
         let stretch = bins.len().div_ceil(stretches);
+        let jitter = stamps::jitter(&recorded.measured);
         Ok(Self {
             recorded,
             commands,
@@ -188,6 +193,7 @@ impl ArmClip {
             dead,
             given,
             warnings,
+            jitter,
             stretch,
             pieces,
             seconds,
@@ -200,10 +206,10 @@ impl ArmClip {
     }
 
     /// The same with dead joints that follow their commands unseen; `None` where no joint is dead.
-    pub(super) fn unseen(&self) -> Option<Self> {
+    pub(super) fn unseen(&self, cell: &Cell) -> Option<Self> {
         let mut clip = Self { given: None, ..self.clone() };
         clip.recorded.desired = self.given.clone()?;
-        clip.commands = CommandTrack::new(&clip.recorded.desired)?;
+        clip.commands = CommandTrack::of_cell(&clip.recorded.desired, cell)?;
         for joint in (0..clip.recorded.measured.dof).filter(|joint| self.dead[*joint]) {
             let name = clip.recorded.joint_names.get(joint).map_or("", String::as_str);
             let joint = format!("joint {} `{name}`", joint + 1);
@@ -214,6 +220,14 @@ impl ArmClip {
             ));
         }
         Some(clip)
+    }
+
+    /// One sigma of what the jitter of stamps makes of a joint's position at a row [rad]: its speed over the neighbouring rows times that.
+    pub(super) fn jitter_at(&self, row: usize, joint: usize) -> f64 {
+        let JointSeries { stamps_ns, q, dof, .. } = &self.recorded.measured;
+        let (before, after) = (row.saturating_sub(1), (row + 1).min(stamps_ns.len() - 1));
+        let way = q[after * dof + joint] - q[before * dof + joint];
+        self.jitter * way / seconds_between(stamps_ns[before], stamps_ns[after]).max(f64::EPSILON)
     }
 
     /// The clip, unless it is too short to say anything about the arm.

@@ -41,7 +41,7 @@ pub(super) fn controlled(cell: &Cell, desired: &JointSeries, theta: &Theta, age:
             *damping = seen;
         }
     }
-    Some((theta, CommandTrack::new(&desired)?))
+    Some((theta, CommandTrack::of_cell(&desired, cell)?))
 }
 
 /// What is read `age` later than it was.

@@ -13,6 +13,7 @@
 //! | `encoder_age` | how old encoder readings are when controller and log get them |
 //! | `noise` | how noisy a signal is, and how quiet a sensor can be |
 //! | `regime` | what a joint is commanded to do at a moment |
+//! | `stamps` | whether stamps say when rows were taken, or jitter |
 //! | `residuals` | what the sensors would have read, against what they read |
 //! | `velocity` | whether logged velocities are the slopes of the positions |
 
@@ -24,6 +25,7 @@ pub mod noise;
 mod piece;
 mod regime;
 mod residuals;
+mod stamps;
 #[cfg(test)]
 mod test_noise;
 pub mod velocity;
@@ -183,7 +185,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
     /// that stands still, and not the joint. `shared`: about right.
     pub fn settle_dead_joints(&mut self, shared: &[f64]) {
         for clip in 0..self.clips.len() {
-            let Some(unseen) = self.clips[clip].unseen() else { continue };
+            let Some(unseen) = self.clips[clip].unseen(&self.cell) else { continue };
             let still = self.cost(clip, shared);
             let held = std::mem::replace(&mut self.clips[clip], unseen);
             self.recent[clip] = Default::default();

@@ -2,7 +2,7 @@
 //! to which its torques belong.
 
 use super::clip::{ArmClip, Run, desired_rows};
-use super::is_tracking;
+use super::{is_tracking, stamps};
 use crate::likelihood::object;
 use shared_mem::cell::Cell;
 use shared_mem::msg::MAX_JOINTS;
@@ -24,7 +24,7 @@ pub(super) const ASKED: usize = 2;
 impl ArmClip {
     /// `None` without commands. `asked_for`: whether the torques that were asked for count: then rows without one do not.
     pub(super) fn at_moments(recorded: Clip, cell: &Cell, asked_for: bool) -> Option<Self> {
-        let commands = CommandTrack::new(&recorded.desired)?;
+        let commands = CommandTrack::of_cell(&recorded.desired, cell)?;
         let alone_until_ns = object::alone_until(cell, &recorded);
         let stamps = &recorded.measured.stamps_ns;
         // The last command holds for as long as that before it did.
@@ -50,6 +50,7 @@ impl ArmClip {
             dead: [false; MAX_JOINTS],
             given: None,
             warnings: Vec::new(),
+            jitter: stamps::jitter(&recorded.measured),
             stretch: 0,
             pieces: Vec::new(),
             seconds: 0.0,

@@ -77,7 +77,11 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
             };
             values[rows[k] * log.dof + joint] - predicted
         };
-        bin.clone().map(error).sum::<f64>() / (self.sigma[channel] * (bin.len() as f64).sqrt())
+        let mut variance = bin.len() as f64 * self.sigma[channel].powi(2);
+        if quantity == "q" && clip.jitter > 0.0 {
+            variance += bin.clone().map(|k| clip.jitter_at(rows[k], joint).powi(2)).sum::<f64>();
+        }
+        bin.clone().map(error).sum::<f64>() / variance.sqrt()
     }
 
     /// Torque that a joint's sensor shows of what its motor gives [N m], of readings a control period apart. What friction takes is in it

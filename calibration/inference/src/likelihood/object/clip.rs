@@ -58,7 +58,7 @@ impl ObjectClip {
                 next_ns = stamp + ARM_EVERY_NS;
             }
         }
-        let commands = CommandTrack::new(&recorded.desired);
+        let commands = CommandTrack::of_cell(&recorded.desired, cell);
         Some(Self { recorded, commands, onset_ns, free_ns, rest_ns, end_ns, arm_rows, arm_ns })
     }
 
