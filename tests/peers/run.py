@@ -28,11 +28,13 @@ of a diagnosis too. The table goes to standard output and to FOLDER/table.txt.
 
 kinds, in turn until there are so many sessions:
   none-arm, none-strokes        nothing is hidden; in half of the strokes friction scatters twice as much as cell.toml says
+  none-arm-logs                 nothing is hidden; commands logged at 1000 to 100 Hz and held or filled in by the controller, stamps that
+                                jitter by up to a quarter of a millisecond, logs that begin while the arm moves
   arm, hit, slide, camera       one effect of the diagnosis's own list, each in turn, from a tenth of its usual size to three times
                                 the largest plausible one
   arm-strokes                   one effect on the arm, seen in strokes
   pair-arm, pair-strokes        two of them
-  outside-arm, outside-strokes  something that the list lacks: a sloshing load, a magnet, wind, a second object, ...
+  outside-arm, outside-strokes  something that the list lacks: a sloshing load, a cable, a shaking base, a magnet, wind, a second object, ...
 
 examples:
   run.py --program target/release/calibration --out peers --short             half an hour on two cores

@@ -47,11 +47,14 @@ class Bag:
         self.writer.finish()
 
 
-def write(stream, desired, measured, poses):
-    """`desired` and `measured`: arrays q, dq, tau (None where not logged); `poses`: (ns, place, turn) in order."""
+def write(stream, desired, measured, poses, log, rng):
+    """`desired` and `measured`: arrays q, dq, tau (None where not logged); `poses`: (ns, place, turn) in order; `log`: which rows are kept."""
     bag = Bag(stream)
     row = lambda series, i: [[] if array is None else array[i] for array in series]
-    events = [(START_NS + i * TICK_NS, kind, i) for i in range(len(desired[0])) for kind in (0, 1)]
+    events = []
+    for kind, every in ((0, log.measured_every), (1, log.every)):
+        kept, stamps = log.stamps(len(desired[0]), every, TICK_NS, rng)
+        events += [(START_NS + int(ns), kind, int(i)) for i, ns in zip(kept, stamps)]
     events += [(ns, 2, i) for i, (ns, _, _) in enumerate(poses)]
     for ns, kind, i in sorted(events):
         if kind == 2:

@@ -4,7 +4,7 @@ import numpy as np
 from . import fr3
 from .camera_effects import turned
 from .effect import Effect
-from .model import MIDDLE, contact
+from .model import MIDDLE, contact, leaning
 
 
 class Outside(Effect):
@@ -89,6 +89,93 @@ class HeldCommands(Outside):
             self.left = int(self.rng.integers(3, self.longest)) if self.rng.random() < 0.02 else 0
         self.left -= 1
         return self.held
+
+
+class Cable(Outside):
+    """A cable along the arm that springs back one joint, about an angle at which it hangs loose, and grows stiffer."""
+
+    name = "cable"
+    acts = True
+    parameters = {"joint": "", "stiffness": "N_m_per_rad", "hardening": "1_per_rad2", "loose_at": "rad"}
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(int(rng.integers(0, 6)), rng.uniform(3, 20), rng.uniform(2, 20), rng.uniform(-0.2, 0.2))
+
+    def sizes(self):
+        return {**super().sizes(), "joint": self.joint + 1}
+
+    def begin(self, plant, q):
+        self.middle = q[self.joint] + self.loose_at
+
+    def step(self, plant):
+        away = plant.data.qpos[plant.position[self.joint]] - self.middle
+        plant.lost[self.joint] += self.stiffness * away * (1 + self.hardening * away * away)
+
+
+class WeakeningMotor(Outside):
+    """A motor that gives less from the middle of the session on, as where it has grown hot."""
+
+    name = "weakening motor"
+    near = ("torque_gain",)
+    parameters = {"joint": "", "left": "", "from_share": ""}
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(int(rng.integers(0, 6)), rng.uniform(0.75, 0.95), rng.uniform(0.3, 0.7))
+
+    def sizes(self):
+        return {**super().sizes(), "joint": self.joint + 1}
+
+    def clip(self, share, rng):
+        self.now = self.left if share > self.from_share else 1.0
+
+    def torque(self, tau):
+        tau = tau.copy()
+        tau[self.joint] *= self.now
+        return tau
+
+
+class PeriodicForce(Outside):
+    """Something that turns pulls at one joint, whatever the arm does."""
+
+    name = "periodic force"
+    acts = True
+    parameters = {"joint": "", "amplitude": "N_m", "frequency": "Hz"}
+
+    @classmethod
+    def draw(cls, rng, cell):
+        joint = int(rng.integers(0, 6))
+        return cls(joint, fr3.by_size(rng.uniform(0.3, 2.0))[joint], rng.uniform(0.7, 8.0))
+
+    def sizes(self):
+        return {**super().sizes(), "joint": self.joint + 1}
+
+    def clip(self, share, rng):
+        self.phase = rng.uniform(0, 2 * np.pi)
+
+    def step(self, plant):
+        plant.lost[self.joint] += self.amplitude * np.sin(2 * np.pi * self.frequency * plant.clock + self.phase)
+
+
+class ShakingBase(Outside):
+    """The base stands on something that sways: gravity as the arm feels it swings."""
+
+    name = "shaking base"
+    near = ("base_tilt",)
+    acts = True
+    parameters = {"angle": "rad", "frequency": "Hz", "direction": "rad"}
+
+    @classmethod
+    def draw(cls, rng, cell):
+        return cls(rng.uniform(0.003, 0.02), rng.uniform(0.7, 4.0), rng.uniform(-np.pi, np.pi))
+
+    def clip(self, share, rng):
+        self.phase = rng.uniform(0, 2 * np.pi)
+
+    def step(self, plant):
+        swing = self.angle * np.sin(2 * np.pi * self.frequency * plant.clock + self.phase)
+        plant.model.opt.gravity[:] = leaning(swing * np.array([np.cos(self.direction), np.sin(self.direction)]))
 
 
 class Magnet(Outside):
@@ -201,5 +288,5 @@ class NoddingTracker(Outside):
         return turned(swing * self.axis, place, turn, MIDDLE + [0.1, 0.1, 0.0])
 
 
-OUTSIDE_ARM = [SloshingLoad, WarmingGears, Hose, HeldCommands]
+OUTSIDE_ARM = [SloshingLoad, WarmingGears, Hose, HeldCommands, Cable, WeakeningMotor, PeriodicForce, ShakingBase]
 OUTSIDE_STROKES = [Magnet, Wind, DriftingFriction, FrictionPyramid, SecondObject, NoddingTracker]

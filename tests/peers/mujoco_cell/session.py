@@ -41,7 +41,8 @@ def record(world, folder, whole=None):
             trace, commands = clip(world, nominal, index, whole)
             clips.append(f"clip_{index:02d}.mcap")
             with open(os.path.join(unfinished, "session", clips[-1]), "wb") as stream:
-                bag.write(stream, *reported(world, trace, commands, world.rng(300 + index)))
+                bag.write(stream, *reported(world, trace, commands, world.rng(300 + index)),
+                          world.logged, world.rng(500 + index))
         texts = {"session/cell.toml": laboratory.cell_toml(world, clips), "truth.json": truth(world), "truth.toml": theta(world)}
         for name, text in texts.items():
             with open(os.path.join(unfinished, name), "w") as stream:
@@ -64,7 +65,7 @@ def clip(world, nominal, index, whole):
         effect.build(build)
     if box is None:
         commands = motion(world, index)
-        trace = Plant(build, world.gains, nominal, effects).run(*commands)
+        trace = Plant(build, world.gains, nominal, effects).run(*(world.logged.given(rows) for rows in commands))
         if np.abs(trace.q - commands[0]).max() > HANGING:
             raise Unusable("the arm does not follow its commands")
         return trace, (*commands, effects)
@@ -142,7 +143,7 @@ def truth(world):
         "object": None if box is None else {
             "mass_kg": float(box.mass), "friction": float(box.friction), "tip_friction": float(box.tip_friction),
             "centre_of_mass_m": laboratory.plain(box.centre_of_mass), "friction_scatter": world.scatter},
-        "engine": vars(engine), "seed": world.seed, "number": world.number,
+        "engine": vars(engine), "log": world.logged.written(), "seed": world.seed, "number": world.number,
     }, indent=1, default=float) + "\n"
 
 

@@ -3,11 +3,11 @@
 True gains lie within 20 % of the nominal ones, the object well inside of the ranges that the laboratory knows. In half of the
 worlds friction scatters from clip to clip twice as much as cell.toml says.
 """
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import fr3, model
+from . import fr3, log, model
 from .camera_effects import CAMERA
 from .control_effects import CONTROL, CommandDelay, CommandLag, JointEncoderOffset, TorqueDelay, TorqueGain
 from .controller import Controller
@@ -30,6 +30,7 @@ KINDS = {
     "outside-arm": (False, OUTSIDE_ARM),
     "outside-strokes": (True, OUTSIDE_STROKES),
     "arm-strokes": (True, [CommandDelay, CommandLag, TorqueDelay, TorqueGain, JointEncoderOffset, *JOINT]),
+    "none-arm-logs": (False, []),
 }
 
 DECLARED_SCATTER = 0.02
@@ -52,6 +53,7 @@ class World:
     leans: tuple  # angles of the tool [rad]
     logs_torques: bool
     effects: list
+    logged: log.Log = field(default_factory=log.Log)
     torques: tuple = ()  # largest of the motions, and what holds the arm up [N m]
 
     def rng(self, purpose):
@@ -74,6 +76,8 @@ def draw(seed, number, kind, which=None):
     else:
         world.torques = torques(world)
     hide(world, effects, which)
+    if kind.endswith("-logs"):
+        world.logged = log.draw(world.rng(2))
     if any(effect.name == "torque_sensor_bias" for effect in world.effects):
         world.logs_torques = True
     return world
