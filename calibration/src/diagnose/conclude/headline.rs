@@ -52,8 +52,10 @@ impl Shrunk {
 
 /// `96 % (94 % to 97 %)`.
 fn with_interval(share: &Share) -> String {
-    let [low, high] = share.ci90.map(percent);
-    format!("{} ({low} to {high})", percent(share.value).replace("> ", "more than ").replace("< ", "less than "))
+    let (value, [low, high]) = (percent(share.value), share.ci90.map(percent));
+    let said = value.replace("> ", "more than ").replace("< ", "less than ");
+    // What is known to the last digit that is shown has no interval to show.
+    if low == value && high == value { said } else { format!("{said} ({low} to {high})") }
 }
 
 /// Residuals beyond this multiple of the noise are said, even where they are no gap [1] (a choice).

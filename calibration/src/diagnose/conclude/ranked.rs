@@ -11,7 +11,7 @@ use crate::diagnose::fit::shortlist::TESTABLE;
 use crate::diagnose::fit::{parameters, time_step};
 use crate::diagnose::judge::confidence;
 use crate::diagnose::judge::gap::{Residuals, SHRINK_OF_A_DOUBLED_GAP};
-use crate::diagnose::judge::held_out::{Measured, estimated};
+use crate::diagnose::judge::held_out::estimated;
 use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::propose::screening;
 use inference::likelihood::Evidence;
@@ -30,8 +30,10 @@ pub(super) fn candidates<E: Evidence>(
     let (found, before) = (decided.found(case), &measures.without.held_out.left);
     let first = &found.steps[0];
     let last = found.steps.last().filter(|_| !found.last.effects.is_empty());
-    let held_out = |step: &Step| Some(Measured::of(bench, split, &step.from, &step.weights).ok()?.held_out.left);
-    let of_step = |step: &Step| if step.from.effects.is_empty() { Some(before.clone()) } else { held_out(step) };
+    let of_step = |step: &Step| match step.from.effects.is_empty() {
+        true => Some(before.clone()),
+        false => estimated(bench, split, &step.from),
+    };
     let drawn_from = DrawnFrom {
         case,
         measures,

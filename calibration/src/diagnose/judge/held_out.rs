@@ -6,7 +6,7 @@
 use super::gap::Residuals;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::effort::THOROUGH;
+use crate::diagnose::fit::effort::{REFINEMENT, THOROUGH};
 use crate::diagnose::fit::left_out::numbers_without;
 use crate::diagnose::work::DiagnoseError;
 use inference::admit::Split;
@@ -67,7 +67,8 @@ fn of_all<E: Evidence>(
         return Some(hypothesis.clone());
     }
     let (effects, full) = (&hypothesis.effects, hypothesis.full.clone());
-    bench.fit(effects, full, &split.confirm, weights, Some(hypothesis), bench.last_pass())
+    let effort = if effects.is_empty() { REFINEMENT } else { bench.last_pass() };
+    bench.fit(effects, full, &split.confirm, weights, Some(hypothesis), effort)
 }
 
 /// Numbers for every command: `hypothesis` was fitted to all. `None` where the twin has no answer without one of them.
