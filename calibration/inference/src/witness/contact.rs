@@ -11,7 +11,7 @@
 use super::corrected::Corrected;
 use super::regression::{Regression, Sample, regress};
 use super::reported::Off;
-use super::{Axis, FEWEST_CLIPS, SHARED_SHARE_OF_NOISE, Shown, Witness};
+use super::{Axis, SHARED_SHARE_OF_NOISE, Shown, Witness};
 use crate::likelihood::object::{SEEN_MOTION, noise_of};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
@@ -37,8 +37,10 @@ const GRAVITY: f64 = 9.81;
 const LEAST_FRICTION: f64 = 0.1;
 /// A push along the table leans by less than this cosine (a choice).
 const ALONG_THE_TABLE: f64 = 0.3;
-/// Fewer rows in contact say nothing (a choice: eight in each of eight pushes).
-const FEWEST_ROWS: usize = 60;
+/// A push of fewer rows may be a blow after which the object is ahead of the tool (a choice: 0.13 s at 60 Hz).
+const FEWEST_ROWS: usize = 8;
+/// So many more pushes than numbers say how much pushes differ (a choice).
+const MORE_CLIPS: usize = 2;
 /// Rows of a clip that share a larger error are not of a contact that holds, or of an object of other dimensions [m] (a choice).
 const LARGEST_SHARED: f64 = 6e-4;
 /// The tool explains what a camera does not where this share of the error that clips share stays (a choice).
@@ -126,10 +128,8 @@ impl Bodies {
 /// The witnesses of pushes.
 pub(super) fn witnesses(cell: &Cell, clips: &[Corrected]) -> Vec<Witness> {
     let of_clip = |(clip, recorded): (usize, &Corrected)| Some(Bodies::of(cell)?.pushes(clip, recorded));
-    let pushes: Vec<Push> = clips.par_iter().enumerate().filter_map(of_clip).flatten().collect();
-    if pushes.len() < FEWEST_ROWS {
-        return Vec::new();
-    }
+    let lasting = clips.par_iter().enumerate().filter_map(of_clip).filter(|pushes| pushes.len() >= FEWEST_ROWS);
+    let pushes: Vec<Push> = lasting.flatten().collect();
     let least_shared = SHARED_SHARE_OF_NOISE * noise_of(cell).position;
     let (camera, tool) = (of_camera(&pushes), of_tool(&pushes));
     let found = |samples: &[Sample], scale: &[f64]| regress(samples, scale, scale.len() - 1, least_shared);
@@ -146,14 +146,13 @@ pub(super) fn witnesses(cell: &Cell, clips: &[Corrected]) -> Vec<Witness> {
 
 /// The witnesses of a regression whose contact holds.
 fn shown(numbers: Vec<Shown>, samples: &[Sample], found: &Regression, scale: &[f64]) -> Vec<Witness> {
-    if found.shared > LARGEST_SHARED {
+    if found.shared > LARGEST_SHARED || found.clips() < numbers.len() + MORE_CLIPS {
         return Vec::new();
     }
     let witness = |(k, number): (usize, Shown)| {
         if found.errors[k] < NARROWED * scale[k] { number.of(STAGE, k, samples, found) } else { None }
     };
-    let all = numbers.into_iter().enumerate().filter_map(witness);
-    all.filter(|witness| witness.clips >= FEWEST_CLIPS).collect()
+    numbers.into_iter().enumerate().filter_map(witness).collect()
 }
 
 fn camera_scale() -> Vec<f64> {

@@ -30,8 +30,6 @@ use shared_mem::theta::Theta;
 /// Standard errors from zero beyond which a witness counts (a choice): of some nine witnesses a session fewer than one in a thousand
 /// lies so far out by chance.
 pub const SIGNIFICANT: f64 = 4.0;
-/// Witnesses come from at least so many clips: clips are the units of evidence (a choice).
-const FEWEST_CLIPS: usize = 6;
 /// A clip's rows may be off by this share of the tracker's noise, all alike: edges of markers, faces that are not quite even
 /// (a choice).
 const SHARED_SHARE_OF_NOISE: f64 = 0.15;

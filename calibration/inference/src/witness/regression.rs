@@ -70,6 +70,11 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Regression {
+    /// How many clips it comes from.
+    pub(super) fn clips(&self) -> usize {
+        self.clips.len()
+    }
+
     /// Rows of each clip.
     fn rows<'a>(&'a self, samples: &'a [Sample]) -> impl Iterator<Item = Vec<usize>> + 'a {
         let of = move |clip: &'a usize| (0..samples.len()).filter(move |row| samples[*row].clip == *clip).collect();

@@ -9,7 +9,7 @@
 use super::corrected::Corrected;
 use super::regression::{Sample, regress};
 use super::reported::Off;
-use super::{Axis, CLIPS, FEWEST_CLIPS, SHARED_SHARE_OF_NOISE, Shown, Witness};
+use super::{Axis, CLIPS, SHARED_SHARE_OF_NOISE, Shown, Witness};
 use crate::likelihood::object::{SEEN_MOTION, noise_of};
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::cell::Cell;
@@ -20,6 +20,8 @@ const STAGE: &str = "rest";
 const AROUND_MOTION_NS: u64 = 100_000_000;
 /// The last poses are those of an object at rest, so many (a choice).
 const LAST_POSES: usize = 10;
+/// Fewer clips do not say how much clips differ (a choice).
+const FEWEST_CLIPS: usize = 6;
 /// A box that leans further does not stand on its face [rad] (a choice).
 const STANDS: f64 = 0.2;
 /// A camera may be turned by so much before anything is measured, one sigma [rad].
