@@ -6,7 +6,7 @@
 //!   own softness are off by. With a tip that is `o` [m] beside where cell.toml has it, in the flange frame `R`: `gap = p . R o - L v + e`.
 //! - Which rows: those in which the object cannot leave the tool. A tool that slows down more slowly than the least friction of cell.toml
 //!   slows the object keeps it, once the first blow is over.
-//! - What it does not show: a camera that is shifted, and a tool, as long as the flange is turned alike in all clips; then the shift names both.
+//! - What it does not separate: shifts of camera and tool, as long as the flange is turned alike in all clips; then the shift names both.
 
 use super::corrected::Corrected;
 use super::regression::{Regression, Sample, regress};

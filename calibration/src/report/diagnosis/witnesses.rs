@@ -14,12 +14,14 @@ pub(super) fn section(witnesses: &[Witness]) -> Markup {
             section {
                 h2 { "What single stages say, without a roll-out" }
                 p.note {
-                    "Each point is a clip; the line is the number, dashed lines are two standard errors to either side. Nothing of the hit, \
-                     of friction or of gains is in it."
+                    "Each point is a clip; the line is the number, dashed lines are two standard errors to either side. \
+                     Nothing of the hit, of friction or of gains is in it."
                 }
                 div.pair { @for witness in shown { figure { (picture(witness)) } } }
                 table {
-                    tr { th { "stage" } th { "effect" } th { "number" } th.n { "standard errors from zero" } th.n { "clips" } th { "shows alike" } }
+                    tr {
+                        th { "stage" } th { "effect" } th { "number" } th.n { "standard errors from zero" } th.n { "clips" } th { "or" }
+                    }
                     @for witness in witnesses {
                         tr {
                             td { (witness.stage) }
