@@ -2,7 +2,7 @@
 
 use super::Effects;
 use super::change::Change;
-use super::parameter::Parameter;
+use super::parameter::{Parameter, Search};
 use super::remedy::{Found, Remedy};
 use super::separation::Separation;
 use super::values::Values;
@@ -92,6 +92,14 @@ impl EffectInfo {
     /// ```
     pub fn remedy(&'static self, cell: &Cell, numbers: &dyn Fn(&str) -> Option<Vec<f64>>) -> Remedy {
         (self.remedy)(&Found::new(self.parameters, numbers, cell))
+    }
+
+    /// Whether a mass, a length or a friction is behind it. A torque that a sensor adds and a periodic law of free order and phase need
+    /// none, so that over a short travel they imitate what has one.
+    pub fn is_of_bodies(&self) -> bool {
+        let any = |of: fn(&Parameter) -> bool| self.parameters.iter().any(of);
+        let read_torque = self.acts_on == Place::JointSensing && any(|parameter| parameter.unit == "N m");
+        !read_torque && !any(|parameter| parameter.search == Search::Periodic)
     }
 
     /// What this effect changes in a model of `cell`, where `numbers` are its parameters by name; one that is not known takes

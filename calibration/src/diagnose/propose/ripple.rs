@@ -41,9 +41,11 @@ pub(in crate::diagnose) fn start<E: Likelihood>(at: &Around<'_, E>, candidate: u
     let orders: Vec<usize> = ripple.alternatives.first()?.form.iter().map(|(k, _)| *k).collect();
     let phases: Vec<usize> =
         ripple.numbers.clone().filter(|k| !ripple.sizes.contains(k) && !orders.contains(k)).collect();
-    let highest = bench.library.unknowns[*orders.first()?].upper;
-    let tried: Vec<f64> =
-        (1..).map(|step| ORDER_STEP * f64::from(step)).take_while(|order| *order <= highest).collect();
+    let range = &bench.library.unknowns[*orders.first()?];
+    let tried: Vec<f64> = (0..)
+        .map(|step| range.lower + ORDER_STEP * f64::from(step))
+        .take_while(|order| *order <= range.upper)
+        .collect();
     let with = |order: f64, phase: f64| {
         let mut full = from.full.clone();
         ripple.sizes.iter().for_each(|k| full[*k] = PROBE_NM);

@@ -2,8 +2,10 @@
 //!
 //! - Equation: `tau_f = amplitude sin(order q + phase)` at each joint.
 //! - Source: cogging and wave-generator ripple of harmonic drives (twice a motor turn: order = twice the gear ratio).
-//! - Units: amplitude N m at the joint; order 1 (periods per radian, times 1); phase rad. Plausible: amplitude 0 to 0.5,
-//!   order 1 to 400, phase -pi to pi.
+//! - Units: amplitude N m at the joint; order 1 (periods per turn of the joint); phase rad. Plausible: amplitude 0 to 0.5,
+//!   order 10 to 400, phase -pi to pi. Two periods per motor turn behind the smallest gears of robot arms (quasi-direct drives,
+//!   5 to 1) are ten per turn of the joint. Below, a ripple is weight with more freedom: gravity at a joint has orders up to the
+//!   number of joints that turn along with it, eight at most.
 //! - Signature (C7): locked to the position, so its frequency is proportional to the speed.
 //! - Confused with: joint elasticity (a fixed frequency), noise.
 
@@ -15,6 +17,9 @@ use crate::effects::parameter::{Elsewhere, Parameter, Search};
 use crate::effects::remedy::Remedy;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+/// Orders of the ripple of gears and motors [1]: from two per motor turn behind a gear of 5 to 1 to four behind one of 100 to 1.
+const ORDERS: [f64; 2] = [10.0, 400.0];
+
 pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     name: "torque_ripple",
     stage: Stage::Control,
@@ -23,8 +28,8 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
         Parameter::size("amplitude", "N m", [0.0, 0.5], 0.0)
             .per_joint()
             .elsewhere(Elsewhere::OfTorqueLimit([0.0, 0.05])),
-        Parameter::form("order", "1", [1.0, 400.0], 200.0).per_joint().searched(Search::Periodic).begun_at(&[
-            &[10.0],
+        Parameter::form("order", "1", ORDERS, 200.0).per_joint().searched(Search::Periodic).begun_at(&[
+            &[ORDERS[0]],
             &[20.0],
             &[40.0],
             &[60.0],
@@ -75,7 +80,15 @@ impl ArmEffect for TorqueRipple {
 #[cfg(test)]
 mod tests {
     use super::super::test_arm::{ROTOR, effects, first, joint, run, turning};
+    use super::ORDERS;
     use crate::arm::JointState;
+    use shared_mem::msg::MAX_JOINTS;
+
+    #[test]
+    fn no_order_is_one_that_weight_has() {
+        // sin(q1 + ... + qn) of joints that move alike: order n.
+        assert!(ORDERS[0] > MAX_JOINTS as f64);
+    }
 
     #[test]
     fn a_joint_rests_in_a_trough_and_keeps_its_energy_over_the_ripple() {
