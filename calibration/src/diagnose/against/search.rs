@@ -193,7 +193,8 @@ impl<E: Evidence> Changes<'_, E> {
 
     /// The model with what is worth most: the best change, or an effect that both sessions have where one is worth more.
     fn extended(&self, step: Step, shared: Vec<Shared>) -> (Step, Option<Extended>) {
-        let best = step.best().map(|trial| (trial.subject, trial.fitted.clone(), trial.net()));
+        let best =
+            step.best(self.pair_bench, self.subjects).map(|trial| (trial.subject, trial.fitted.clone(), trial.net()));
         let ahead = best.as_ref().map_or(0.0, |(_, _, net)| *net);
         let from = &step.from;
         // The first of those that are worth the same.
@@ -241,9 +242,17 @@ impl Step {
         self.trials.iter().filter(|trial| trial.is_proven())
     }
 
-    /// The proven trial that is worth most.
-    fn best(&self) -> Option<&Trial> {
-        self.proven().max_by(|a, b| a.net().total_cmp(&b.net()))
+    /// The proven trial that is worth most. Of those that are worth the same as far as clips tell, what has a mass, a length or a
+    /// friction behind it explains before what needs none.
+    fn best<E: Evidence>(&self, pair_bench: &PairBench<'_, E>, subjects: &[Subject]) -> Option<&Trial> {
+        let best = self.proven().max_by(|a, b| a.net().total_cmp(&b.net()))?;
+        if subjects[best.subject].is_of_bodies {
+            return Some(best);
+        }
+        let as_good = |trial: &&Trial| {
+            subjects[trial.subject].is_of_bodies && pair_bench.gain(&best.fitted, &trial.fitted).may_be_none(1.0)
+        };
+        self.proven().filter(as_good).max_by(|a, b| a.net().total_cmp(&b.net())).or(Some(best))
     }
 
     /// What does as well as the change that was added, with no more parameters.
