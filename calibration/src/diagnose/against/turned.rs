@@ -50,8 +50,9 @@ pub(super) struct Model {
     pub(super) turned: Vec<Turned>,
 }
 
-/// How far gains of the second session may be from what cell.toml states: firmware gains are switched by powers of two.
-const MAX_GAIN_FACTOR: f64 = 10.0;
+/// How far gains of a session may be from what cell.toml states once each session has its own: firmware gains are switched by powers of
+/// two.
+pub(super) const MAX_GAIN_FACTOR: f64 = 10.0;
 
 impl Model {
     /// Everything shared: `free` numbers at `full`.
@@ -113,10 +114,10 @@ impl Model {
     pub(super) fn library(&self, whole: &Library) -> Library {
         let chosen = self.turned.iter().map(|turned| {
             let unknown = &whole.unknowns[turned.number];
-            let of_b = turned.acts == Acts::In(Side::B);
+            let own = turned.acts != Acts::Everywhere;
             let is_gain =
                 matches!(whole.settings.settings()[turned.number], Setting::Stiffness(_) | Setting::Damping(_));
-            let [lower, upper] = if of_b && is_gain {
+            let [lower, upper] = if own && is_gain {
                 [unknown.lower / MAX_GAIN_FACTOR, unknown.upper * MAX_GAIN_FACTOR]
             } else {
                 [unknown.lower, unknown.upper]

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use shared_mem::cell::{Cell, Controller, ControllerKind, Range, Robot as CellRobot};
 use shared_mem::theta::Theta;
 use twin::arm::{ArmModel, damping_range, stiffness_range};
-use twin::effects::{EffectInfo, Parameter, Robot, Role, Search, Shape, Stage, unknown_weight};
+use twin::effects::{EffectInfo, Parameter, Place, Robot, Role, Search, Shape, Stage, unknown_weight};
 use twin::scene::ObjectModel;
 
 /// Gains stated by value are searched this many times up and down [1]: the values are right to 20 %, and a bound must not be mistaken for them.
@@ -111,6 +111,9 @@ pub fn object_parameters(cell: &Cell, base: &Theta) -> Vec<(Setting, Unknown)> {
 
 /// How far beyond what is plausible an effect is searched, over the width of that range [1]: a choice.
 const SEARCHED_BEYOND_PLAUSIBLE: f64 = 0.5;
+/// A factor on what a motor gives is off by any ratio where its constant or its gear is another: followed so many times up and down [1], as
+/// far as firmware gains are switched (a choice).
+const FACTOR_FOLLOWED: f64 = 10.0;
 /// Difference step over the width of what is plausible [1].
 const EFFECT_STEP: f64 = 2e-3;
 /// The same where hits lie between the number and what is seen, of a tool or of a gear's flanks: over this step their
@@ -142,7 +145,13 @@ pub fn effect_settings(info: &'static EffectInfo, robot: &Robot, dof: usize) -> 
         for index in indices {
             let met = robot.range(parameter, index);
             let setting = Setting::Effect { name: info.name, parameter: parameter.name, index, inverse };
-            all.push(unknown(setting, start, searched(parameter, met, inverse), share * width(met, inverse)));
+            let is_factor = info.acts_on == Place::TorquePath && matches!(parameter.role, Role::Size { neutral: 1.0 });
+            let range = if is_factor {
+                [start / FACTOR_FOLLOWED, start * FACTOR_FOLLOWED]
+            } else {
+                searched(parameter, met, inverse)
+            };
+            all.push(unknown(setting, start, range, share * width(met, inverse)));
         }
     }
     all
@@ -168,4 +177,18 @@ fn width([lo, hi]: Range, inverse: bool) -> f64 {
 
 fn unknown(setting: Setting, start: f64, [lower, upper]: Range, step: f64) -> (Setting, Unknown) {
     (setting, Unknown { name: setting.name(), start: start.clamp(lower, upper), lower, upper, step })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twin::effects::find;
+
+    #[test]
+    fn a_drive_of_twice_the_torque_lies_inside_of_what_is_searched() {
+        let gain = find("torque_gain").expect("an effect");
+        for (_, unknown) in effect_settings(gain, &Robot::unknown(), 7) {
+            assert!(unknown.start == 1.0 && unknown.lower < 0.25 && unknown.upper > 4.0, "{unknown:?}");
+        }
+    }
 }
