@@ -101,19 +101,17 @@ fn others(found: &Comparison) -> Markup {
     let rest = |wanted: Status| found.candidates.iter().filter(move |candidate| candidate.status == wanted);
     html! {
         section {
-            h2 { "What did not change" }
+            h2 { "What was not seen to change" }
             p.note {
                 "The smallest change that would have been seen in nine of ten sessions like these: of one number alone, everything else \
                 as uncertain as it is."
             }
             table {
                 tr { th { "parameter or effect" } th { "smallest change seen" } th { "why not" } }
-                @for candidate in rest(Status::RuledOut) {
+                @for candidate in rest(Status::RuledOut).chain(rest(Status::NotTestable)) {
                     tr { td { (words(&candidate.name)) } td { (smallest(candidate)) } td { (candidate.why) } }
                 }
             }
-            @let blind: Vec<String> = rest(Status::NotTestable).map(|candidate| words(&candidate.name)).collect();
-            @if !blind.is_empty() { p { "Not seen, whatever it did: " (blind.join(", ")) "." } }
         }
     }
 }

@@ -49,7 +49,7 @@ pub struct Comparison {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Verdict {
     /// `none`: nothing changed as far as these clips show; `named`; `class`; `unexplained`: B deviates, and nothing that may change
-    /// alone explains it; `not_testable`.
+    /// alone explains it; `not_testable`: of too little of what may change a change would have been seen.
     pub kind: Kind,
     /// What changed, or the members of the class: parameters and effects by name.
     pub changes: Vec<String>,
@@ -102,9 +102,9 @@ pub struct Values {
 /// The smallest change of each number of a parameter that would have been seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Smallest {
-    /// Of each number alone.
+    /// Of each number alone; none where no change of it would have been seen.
     #[serde(rename = "value", serialize_with = "one_or_list")]
-    pub values: Vec<f64>,
+    pub values: Vec<Option<f64>>,
     pub unit: String,
 }
 
@@ -125,7 +125,7 @@ mod tests {
             Values { a: vec![0.0], b: vec![0.012], change: vec![0.012], ci95: vec![[0.011, 0.013]], unit: "s".into() };
         let text = serde_json::to_string(&delay).expect("JSON");
         assert_eq!(text, r#"{"a":0.0,"b":0.012,"change":0.012,"ci95":[0.011,0.013],"unit":"s"}"#);
-        let two = Smallest { values: vec![0.1, 0.2], unit: "N m".into() };
-        assert_eq!(serde_json::to_string(&two).expect("JSON"), r#"{"value":[0.1,0.2],"unit":"N m"}"#);
+        let two = Smallest { values: vec![Some(0.1), None], unit: "N m".into() };
+        assert_eq!(serde_json::to_string(&two).expect("JSON"), r#"{"value":[0.1,null],"unit":"N m"}"#);
     }
 }

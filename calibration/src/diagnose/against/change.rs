@@ -50,12 +50,16 @@ pub fn rows(subject: &str, name: &str, values: &Values) -> Vec<[String; 4]> {
     (0..values.a.len()).map(one).collect()
 }
 
-/// `coulomb 0.021 N m`, or `coulomb 0.021 to 0.11 N m, joint by joint`.
+/// `coulomb 0.021 N m`, `coulomb 0.021 to 0.11 N m, joint by joint`, or `coulomb at no size`.
 pub fn smallest_in_words(name: &str, subject: &str, smallest: &Smallest) -> String {
-    let [low, high] = span(smallest.values.iter().copied());
+    let [low, high] = span(smallest.values.iter().flatten().copied());
     let unit = Unit::suited(&smallest.unit, high);
     let name = if name == subject { String::new() } else { format!("{} ", words(name)) };
-    if smallest.values.len() < 2 {
+    let (all, blind) = (smallest.values.len(), smallest.values.iter().filter(|value| value.is_none()).count());
+    if blind == all {
+        return format!("{name}at no size");
+    }
+    if all < 2 {
         return format!("{name}{}", unit.with_unit(high));
     }
     let what = if of_joints(name.trim()) || of_joints(&format!("{subject}.{}", name.trim())) || of_joints(subject) {
@@ -63,7 +67,8 @@ pub fn smallest_in_words(name: &str, subject: &str, smallest: &Smallest) -> Stri
     } else {
         "each alone"
     };
-    format!("{name}{} to {}, {what}", short(unit.scaled(low)), unit.with_unit(high))
+    let not_all = if blind > 0 { format!(", at no size in {blind} of {all}") } else { String::new() };
+    format!("{name}{} to {}, {what}{not_all}", short(unit.scaled(low)), unit.with_unit(high))
 }
 
 fn unit_of(values: &Values) -> Unit {
@@ -97,10 +102,13 @@ mod tests {
             rows[1].each_ref().map(String::as_str),
             ["stiffness, joint 2", "600 N m/rad", "1200 N m/rad", "600 [290, 310] N m/rad"]
         );
-        let seen = Smallest { values: vec![0.02, 0.1], unit: "N m".into() };
-        assert_eq!(
-            smallest_in_words("coulomb", "joint_coulomb_friction", &seen),
-            "coulomb 0.020 to 0.100 N m, joint by joint"
-        );
+        let seen = |values: &[Option<f64>]| {
+            let smallest = Smallest { values: values.to_vec(), unit: "N m".into() };
+            smallest_in_words("coulomb", "joint_coulomb_friction", &smallest)
+        };
+        assert_eq!(seen(&[Some(0.02), Some(0.1)]), "coulomb 0.020 to 0.100 N m, joint by joint");
+        let one_blind = seen(&[Some(0.02), None, Some(0.1)]);
+        assert_eq!(one_blind, "coulomb 0.020 to 0.100 N m, joint by joint, at no size in 1 of 3");
+        assert_eq!(seen(&[None, None]), "coulomb at no size");
     }
 }

@@ -1,12 +1,12 @@
 //! From what the search found to the answer, measured on held-out clips.
 
-use super::answer::{Candidate, Comparison, Smallest, Verdict};
+use super::answer::{Candidate, Comparison, Verdict};
 use super::changes;
 use super::fits::{PairBench, numbers};
 use super::headline::{self, Facts};
 use super::pair::Pair;
-use super::scores::Score;
-use super::search::{Found, Step, Trial, smallest_seen};
+use super::power::Power;
+use super::search::{Found, Step, Trial};
 use super::subjects::Subject;
 use super::turned::Side;
 use crate::answer::diagnosis::{Clips, Kind, SensorGap, Share, Status};
@@ -15,13 +15,14 @@ use crate::diagnose::conclude::site::{Advice, Site};
 use crate::diagnose::criteria::{CLASS_IS_RIGHT, MOST_OF_IT, UNKNOWN_IS_RIGHT};
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::confidence::MAX_PROBABILITY;
+use crate::diagnose::judge::ends;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out::HeldOut;
 use crate::diagnose::judge::localise;
 use crate::diagnose::judge::sizes::Sizes;
 use crate::diagnose::select::gain::SAME_WORTH_NATS;
 use crate::diagnose::work::{DiagnoseError, Options};
-use inference::likelihood::{Evidence, Setting};
+use inference::likelihood::Evidence;
 use shared_mem::recording::Session;
 use std::collections::BTreeMap;
 
@@ -55,8 +56,11 @@ pub(super) fn conclude<E: Evidence>(
     let shrink = with.left.shrink(before, options.seed);
     let rivals = rivals(pair_bench, case);
     let deviates = deviates(pair_bench, case);
+    let library = pair_bench.bench.library;
+    let power = Power { library, of_a: &case.of_a.full, subjects: case.subjects, scores: &found.steps[0].scores };
     let kind = match (found.last.changed.is_empty() || shrink.value <= 0.0, rivals.is_empty()) {
         (true, _) if deviates.is_some() => Kind::Unexplained,
+        (true, _) if !power.is_enough() => Kind::NotTestable,
         (true, _) => Kind::None,
         (false, true) => Kind::Named,
         (false, false) => Kind::Class,
@@ -69,7 +73,7 @@ pub(super) fn conclude<E: Evidence>(
         options.seed,
     );
     let (gap_of_a, places) = (of_a(pair_bench, case), localise::localise(pair_bench.bench.evidence, before));
-    let candidates = candidates(pair_bench, case, kind, &rivals, before, options.seed);
+    let candidates = candidates(pair_bench, case, &Judged { kind, rivals: &rivals, power: &power }, before, options.seed);
     let changes: Vec<String> = if believed { named(case, &rivals) } else { Vec::new() };
     let facts = Facts::of(&candidates, gap.shrink, deviates.unwrap_or(1.0), places.first());
     let text = headline::sentence(kind, &facts);
@@ -79,7 +83,7 @@ pub(super) fn conclude<E: Evidence>(
     let files = |set: &[usize]| set.iter().map(|clip| case.pair.admitted.files[*clip].clone()).collect();
     let in_b = if believed { found.last.fitted.model.of(Side::B) } else { found.without.model.of(Side::B) };
     Ok(Comparison {
-        verdict: Verdict { kind, changes, confidence: confidence(kind, &candidates), text },
+        verdict: Verdict { kind, changes, confidence: confidence(kind, &candidates, power.share()), text },
         gap,
         gap_of_a,
         places,
@@ -92,7 +96,7 @@ pub(super) fn conclude<E: Evidence>(
             choose: files(&pair_bench.split.choose),
             confirm: files(&pair_bench.split.confirm),
         },
-        warnings: case.pair.admitted.warnings.clone(),
+        warnings: warnings(pair_bench, case),
         seconds: 0.0,
         session: case.sessions[0].folder.display().to_string(),
         against: session.folder.display().to_string(),
@@ -101,6 +105,13 @@ pub(super) fn conclude<E: Evidence>(
         theta: pair_bench.bench.library.theta(in_b),
         theta_file: None,
     })
+}
+
+/// What has to be known beside the answer: of the recordings, and of gains that stopped at an end of their range.
+fn warnings<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<String> {
+    let fitted = &case.found.last.fitted;
+    let ended = ends::of_gains(&fitted.model.library(pair_bench.bench.library), &fitted.hypothesis.full);
+    case.pair.admitted.warnings.iter().cloned().chain(ended).collect()
 }
 
 /// What A's own clips leave under what was found on A.
@@ -152,15 +163,23 @@ fn shared<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<St
     case.subjects.iter().filter(acts).map(|subject| subject.name.clone()).collect()
 }
 
+/// What is known of all that may have changed.
+struct Judged<'a> {
+    kind: Kind,
+    /// Subjects that do as well as one that changed.
+    rivals: &'a [usize],
+    power: &'a Power<'a>,
+}
+
 /// What is said of everything that may have changed.
 fn candidates<E: Evidence>(
     pair_bench: &PairBench<'_, E>,
     case: &Case<'_>,
-    kind: Kind,
-    rivals: &[usize],
+    judged: &Judged<'_>,
     before: &Residuals,
     seed: u64,
 ) -> Vec<Candidate> {
+    let Judged { kind, rivals, power } = *judged;
     let (found, first) = (case.found, &case.found.steps[0]);
     let likely = probabilities(&found.steps);
     let one = |(index, subject): (usize, &Subject)| {
@@ -172,12 +191,10 @@ fn candidates<E: Evidence>(
             .and_then(|fitted| Some(pair_bench.held_out(fitted, &found.weights)?.left));
         let shrink = with.map_or(Share { value: 0.0, ci90: [0.0; 2] }, |with| with.shrink(before, seed));
         let score = first.scores.iter().find(|score| score.subject == index);
-        let smallest = score.map(|score| smallest(pair_bench, score)).unwrap_or_default();
-        let seen = score.is_some_and(|score| could_be_seen(pair_bench, score));
         let status = match kind {
             Kind::Named if changed => Status::Named,
             Kind::Class if changed || rivals.contains(&index) => Status::Possible,
-            _ if !seen => Status::NotTestable,
+            _ if !power.shows(index) => Status::NotTestable,
             _ => Status::RuledOut,
         };
         let alike: Vec<String> =
@@ -191,7 +208,7 @@ fn candidates<E: Evidence>(
             confusable_with: alike,
             status,
             why: headline::reason(status, score.map(|score| (score.p, score.gain)), trial),
-            smallest_seen: smallest,
+            smallest_seen: power.smallest(index),
         }
     };
     let place = |index: usize| first.scores.iter().position(|score| score.subject == index).unwrap_or(usize::MAX);
@@ -221,40 +238,14 @@ fn probabilities(steps: &[Step]) -> BTreeMap<usize, f64> {
     all
 }
 
-fn confidence(kind: Kind, candidates: &[Candidate]) -> f64 {
+/// How sure a verdict is; `shown`: share of the subjects of which a change would have been seen. That nothing changed is no surer.
+fn confidence(kind: Kind, candidates: &[Candidate], shown: f64) -> f64 {
     let named = candidates.iter().filter(|candidate| candidate.status == Status::Named);
     match kind {
         Kind::Named => named.map(|candidate| candidate.probability).fold(MAX_PROBABILITY, f64::min),
-        Kind::None => MAX_PROBABILITY,
+        Kind::None => MAX_PROBABILITY * shown,
         Kind::Class => CLASS_IS_RIGHT.value,
         Kind::Unexplained => UNKNOWN_IS_RIGHT.value,
         Kind::NotTestable => 1.0,
     }
-}
-
-/// The smallest change of every size that would have been seen, by parameter.
-fn smallest<E: Evidence>(pair_bench: &PairBench<'_, E>, score: &Score) -> BTreeMap<String, Smallest> {
-    let mut all: BTreeMap<String, Smallest> = BTreeMap::new();
-    for (number, sigma) in &score.sigma {
-        let setting = &pair_bench.bench.library.settings.settings()[*number];
-        // Of a stiffness that is turned as its inverse no change has a size of its own.
-        if matches!(setting, Setting::Effect { inverse: true, .. }) {
-            continue;
-        }
-        let unit = setting.physical_unit();
-        let parameter =
-            all.entry(changes::name(&setting.parameter())).or_insert_with(|| Smallest { values: Vec::new(), unit });
-        parameter.values.push(smallest_seen(*sigma, score.cost));
-    }
-    all
-}
-
-/// Whether a change of a plausible size would have been seen in any of its numbers.
-fn could_be_seen<E: Evidence>(pair_bench: &PairBench<'_, E>, score: &Score) -> bool {
-    let library = pair_bench.bench.library;
-    score.sigma.iter().any(|(number, sigma)| {
-        let unknown = &library.unknowns[*number];
-        let largest = (unknown.upper - unknown.start).max(unknown.start - unknown.lower);
-        smallest_seen(*sigma, score.cost) < largest
-    })
 }

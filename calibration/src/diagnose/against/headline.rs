@@ -18,8 +18,10 @@ pub(super) struct Facts {
     /// How many times as much B leaves as A, and where.
     times: f64,
     place: String,
-    /// The smallest changes that would have been seen.
+    /// The smallest changes that would have been seen, those of the parameters that every cell has before those of effects.
     seen: Vec<String>,
+    /// What a plausible change would not have been seen of; of parameters with the size from which on it would.
+    blind: Vec<String>,
 }
 
 impl Facts {
@@ -33,8 +35,15 @@ impl Facts {
             |candidate: &&&Candidate| !candidate.confusable_with.is_empty() || candidate.status == Status::Named;
         let (changes, rivals): (Vec<&Candidate>, Vec<&Candidate>) =
             open.iter().partition(|candidate| fitted(candidate));
-        let seen = candidates.iter().filter(|candidate| candidate.status == Status::RuledOut);
-        let seen = seen.filter_map(said_smallest).take(MAX_LISTED).collect();
+        let of = |status, effects| {
+            let all = candidates.iter();
+            all.filter(move |candidate| candidate.status == status && candidate.is_effect == effects)
+        };
+        let smallest = |candidate: &Candidate| said_smallest(candidate);
+        let effects = of(Status::RuledOut, true).filter_map(smallest).take(MAX_LISTED);
+        let seen = of(Status::RuledOut, false).filter_map(smallest).chain(effects).collect();
+        let parameters = of(Status::NotTestable, false).filter_map(smallest);
+        let blind = parameters.chain(of(Status::NotTestable, true).map(|candidate| words(&candidate.name))).collect();
         let [low, high] = shrink.ci90.map(percent);
         Self {
             changes: changes.into_iter().map(change).collect(),
@@ -45,6 +54,7 @@ impl Facts {
                 format!(", most of it in {} ({})", channel_in_words(&place.channel), place.regime)
             }),
             seen,
+            blind,
         }
     }
 }
@@ -67,12 +77,19 @@ pub(super) fn sentence(kind: Kind, facts: &Facts) -> String {
              effect that changes explains it.",
             facts.times, facts.place
         ),
-        Kind::None | Kind::NotTestable if facts.seen.is_empty() => {
-            "Nothing changed that these clips show, and no change of any candidate of a plausible size would have been seen.".into()
-        }
-        Kind::None | Kind::NotTestable => format!(
-            "Nothing changed that these clips show; in nine of ten such sessions a change of this size would have been seen: {}.",
-            facts.seen.join("; ")
+        Kind::None => format!(
+            "Nothing changed that these clips show; in nine of ten such sessions a change of this size would have been seen: {}{}.",
+            facts.seen.join("; "),
+            blind(&facts.blind, "; no plausible change would have been of ")
+        ),
+        Kind::NotTestable if facts.seen.is_empty() => format!(
+            "Not testable: no change of a plausible size would have been seen in nine of ten such sessions{}.",
+            blind(&facts.blind, ", and none of another before ")
+        ),
+        Kind::NotTestable => format!(
+            "Not testable: of too little a change of a plausible size would have been seen in nine of ten such sessions: {}{}.",
+            facts.seen.join("; "),
+            blind(&facts.blind, "; not seen before ")
         ),
     }
 }
@@ -88,9 +105,16 @@ fn change(candidate: &Candidate) -> String {
     if numbers.is_empty() { format!("{name} changed") } else { format!("{name} changed: {}", numbers.join("; ")) }
 }
 
+/// What is not seen, behind `before`; empty where all is.
+fn blind(all: &[String], before: &str) -> String {
+    if all.is_empty() { String::new() } else { format!("{before}{}", all.join("; ")) }
+}
+
+/// A candidate with the smallest change of each of its numbers.
 fn said_smallest(candidate: &Candidate) -> Option<String> {
-    let (name, smallest): (&String, &Smallest) = candidate.smallest_seen.iter().next()?;
-    Some(format!("{} {}", words(&candidate.name), smallest_in_words(name, &candidate.name, smallest)))
+    let one = |(name, smallest): (&String, &Smallest)| smallest_in_words(name, &candidate.name, smallest);
+    let all: Vec<String> = candidate.smallest_seen.iter().map(one).collect();
+    (!all.is_empty()).then(|| format!("{} {}", words(&candidate.name), all.join(", ")))
 }
 
 /// Why a candidate is what it is.
@@ -106,5 +130,43 @@ pub(super) fn reason(status: Status, slopes: Option<(f64, f64)>, trial: Option<&
         (_, None, Some((p, _))) if p < CHANGES.max_chance => "its slopes explain far less than those of others".into(),
         (_, None, Some((p, _))) => format!("its slopes explain no more than chance does (p = {p:.2})"),
         (_, None, None) => "it was not looked at".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    fn candidate(name: &str, is_effect: bool, status: Status, sizes: &[Option<f64>]) -> Candidate {
+        let smallest = Smallest { values: sizes.to_vec(), unit: "N m/rad".into() };
+        Candidate {
+            name: name.into(),
+            is_effect,
+            probability: 0.0,
+            parameters: BTreeMap::new(),
+            shrink: Share::default(),
+            confusable_with: Vec::new(),
+            status,
+            why: String::new(),
+            smallest_seen: BTreeMap::from([(name.to_owned(), smallest)]),
+        }
+    }
+
+    #[test]
+    fn where_nothing_was_learned_the_sentence_says_from_which_size_on_a_change_is_seen() {
+        let all = [
+            candidate("payload", true, Status::NotTestable, &[None]),
+            candidate("stiffness", false, Status::NotTestable, &[Some(535.0)]),
+        ];
+        let said = |kind, all: &[Candidate]| sentence(kind, &Facts::of(all, Share::default(), 1.0, None));
+        let text = said(Kind::NotTestable, &all);
+        assert!(text.starts_with("Not testable: ") && text.contains("stiffness 535 N m/rad; payload"), "{text}");
+        let seen = [&all[..1], &[candidate("stiffness", false, Status::RuledOut, &[Some(12.0)])]].concat();
+        let text = said(Kind::None, &seen);
+        assert!(
+            text.contains("seen: stiffness 12.0 N m/rad; no plausible change would have been of payload."),
+            "{text}"
+        );
     }
 }

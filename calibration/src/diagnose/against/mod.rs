@@ -12,6 +12,7 @@
 //! | `turned` | numbers that both sessions share and numbers that each has of its own |
 //! | `subjects` | what may have changed |
 //! | `scores` | what the slopes say of every change, and how small a change they would show |
+//! | `power` | how small a change would have been seen |
 //! | `fits` | models of both sessions fitted, and what one is worth over another |
 //! | `search` | changes added while they are worth it |
 //! | `changes`, [`change`] | values in A and B, and the change with its interval; the same in words |
@@ -24,6 +25,7 @@ mod conclude;
 mod fits;
 mod headline;
 pub mod pair;
+mod power;
 mod scores;
 mod search;
 mod subjects;
