@@ -6,8 +6,8 @@ use super::measure::Measures;
 use super::verdict::{Decision, Finding};
 use crate::answer::diagnosis::Kind;
 use crate::diagnose::judge::held_out::Measured;
+use crate::diagnose::judge::needed::FinalModel;
 use crate::diagnose::judge::partly::{self, Partly};
-use crate::diagnose::judge::score::predict;
 use crate::diagnose::judge::trial::{Found, Step};
 use crate::diagnose::judge::{confidence, drift, remainder};
 use inference::likelihood::Evidence;
@@ -24,8 +24,7 @@ pub(super) fn decide<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -
     let finding = finding(case, measures);
     let decision = finding.decide();
     let partly = if decision.kind == Kind::Unexplained {
-        let (before, overdispersion) = (&measures.without.held_out.left, &measures.overdispersion);
-        partly::proven(case.bench, case.split, case.found, before, overdispersion, case.options.seed)
+        partly::proven(case.bench, case.split, case.found, &measures.without.held_out.left, case.options.seed)
     } else {
         None
     };
@@ -101,13 +100,7 @@ fn stands_in<E: Evidence>(case: &Case<'_, E>, step: &Step, effect: usize, rival:
     let Some((fit, _)) = fitted.filter(|_| last.effects.len() > 1) else {
         return true;
     };
-    let effects: Vec<usize> = last.effects.iter().map(|other| if *other == effect { rival } else { *other }).collect();
-    // The rival begins where its own trial ended, and the effect that it stands for is taken back.
-    let mut full = last.full.clone();
-    bench.library.candidates[effect].numbers.clone().for_each(|k| full[k] = bench.library.unknowns[k].start);
-    bench.library.candidates[rival].numbers.clone().for_each(|k| full[k] = fit.full[k]);
-    let swapped = bench.fit(&effects, full, &split.train, weights, Some(last), bench.last_pass());
-    let predicted = |hypothesis| predict(bench, hypothesis, &split.choose, weights);
-    let Some((with, instead)) = predicted(last).zip(swapped.as_ref().and_then(predicted)) else { return true };
-    with.over(&instead).may_be_none(1.0)
+    let model = FinalModel::new(bench, split, last, weights);
+    let ahead = model.and_then(|model| model.over_instead(effect, rival, fit, bench.last_pass()));
+    ahead.is_none_or(|ahead| ahead.may_be_none(1.0))
 }

@@ -12,6 +12,7 @@
 //! | `recorded_arm` | whose an object's gap is: the arm's, or the object's |
 //! | `unproven` | what more clips would prove |
 //! | `tolerance` | whether a gap is of interest |
+//! | `needed` | whether a final model needs each of its effects, and what could stand in for one |
 //! | `partly` | what is proven although a part of the gap stays |
 //! | `confidence` | how sure a finding is, and what its rivals are |
 //! | `trial` | candidates tried on top of a hypothesis, and what makes one of them a cause |
@@ -24,6 +25,7 @@ pub(super) mod ends;
 pub mod gap;
 pub(super) mod held_out;
 pub mod localise;
+pub(super) mod needed;
 pub(super) mod partly;
 pub(super) mod recorded_arm;
 pub mod remainder;

@@ -18,9 +18,7 @@ pub(in crate::diagnose) const MIN_NATS_PER_ROW: f64 = 0.0025;
 /// Of one that closes so much of the gap, and predicts nearly all clips better, one that it predicts worse does not matter.
 pub(in crate::diagnose) const LARGE_SHARE_CLOSED: f64 = 0.2;
 /// A gain of so many of its standard errors is no chance.
-const NO_CHANCE_SIGMAS: f64 = 3.5;
-/// An effect that leads is worth this share more than others: two effects of nearly the same worth do the same.
-const LEAD_SHARE: f64 = 0.2;
+pub(super) const NO_CHANCE_SIGMAS: f64 = 3.5;
 /// More parameters make a gain larger by this share whatever acts: friction at rest is every engine's own.
 const NUMERICS_OF_GAIN: f64 = 1e-3;
 /// Where nuisance parameters of clips hide what a candidate closes from the likelihood, one that has more parameters than another must
@@ -119,15 +117,26 @@ impl Found {
 }
 
 impl Step {
-    /// The trial that is worth most among those worth it.
+    /// The trial that is worth most among those worth it. Of those that are worth the same as far as clips tell, what has a mass, a
+    /// length or a friction behind it explains before what needs none.
     pub fn best<E: Evidence>(&self, bench: &Bench<'_, E>) -> Option<(&Trial, &Hypothesis, &Gain)> {
         let fitted = self.trials.iter().filter_map(|trial| trial.fitted.as_ref().map(|(fit, gain)| (trial, fit, gain)));
         let convincing_ones: Vec<(&Trial, &Hypothesis, &Gain)> =
             fitted.filter(|(trial, fit, gain)| self.convinces(bench, trial, fit, gain)).collect();
         let simplest =
             |(trial, ..): &&(&Trial, _, _)| !convincing_ones.iter().any(|(other, ..)| trial.is_outdone_by(other));
-        let worth = |(trial, _, advantage): &(&Trial, _, &Gain)| advantage.net(trial.scored.cost);
-        convincing_ones.iter().filter(simplest).max_by(|a, b| worth(a).total_cmp(&worth(b))).copied()
+        let worth = |trial: &Trial| trial.gain().map_or(0.0, |gain| gain.net(trial.scored.cost));
+        let most =
+            |a: &&(&Trial, &Hypothesis, &Gain), b: &&(&Trial, &Hypothesis, &Gain)| worth(a.0).total_cmp(&worth(b.0));
+        let best = convincing_ones.iter().filter(simplest).max_by(most)?;
+        let of_bodies = |trial: &Trial| bench.library.candidates[trial.scored.candidate].effect.is_of_bodies();
+        if of_bodies(best.0) {
+            return Some(*best);
+        }
+        let as_good = |(trial, _, gain): &&(&Trial, &Hypothesis, &Gain)| {
+            of_bodies(trial) && best.2.beyond(gain).may_be_none(1.0) && self.comes_as_near(trial, best.0)
+        };
+        convincing_ones.iter().filter(as_good).max_by(most).or(Some(best)).copied()
     }
 
     /// Whether it is no chance that a trial gains this, and what it gains no numerics.
@@ -189,24 +198,6 @@ impl Step {
         self.trial(candidate).and_then(Trial::gain).is_some_and(clear) && self.is_alone(library, candidate)
     }
 
-    /// Whether a trial leads: as clear as one that stands out, and ahead of every other cause that does not look like it, by half of
-    /// what it is worth, or by a fifth and clip by clip far beyond chance.
-    pub fn leads(&self, library: &Library, candidate: usize) -> bool {
-        let Some(trial) = self.trial(candidate) else { return false };
-        let Some(own) = trial.gain() else { return false };
-        // Where every clip gains and most of the gap closes, the scatter between gains says how unequal clips are.
-        let in_all = own.share == 1.0 && trial.closes > MOST_OF_IT;
-        if !own.in_nearly_all() || !in_all && own.nats <= NO_CHANCE_SIGMAS * own.error {
-            return false;
-        }
-        let ahead_of = |other: &Trial| {
-            let beyond = other.gain().map(|other| own.beyond(other));
-            beyond.is_none_or(|by| by.nats > NO_CHANCE_SIGMAS * by.error && by.nats > LEAD_SHARE * own.nats)
-        };
-        let mut near = self.causes_unlike(library, candidate).filter(|other| self.comes_as_near(other, trial));
-        self.is_alone(library, candidate) || near.all(ahead_of)
-    }
-
     /// The other effects that could be the cause and are not known to look like a candidate.
     fn causes_unlike(&self, library: &Library, candidate: usize) -> impl Iterator<Item = &Trial> {
         let unlike = move |other: usize| other != candidate && !library.look_alike(candidate, other);
@@ -228,5 +219,62 @@ impl Step {
         let worth = |trial: &Trial| trial.gain().map(|gain| gain.net(trial.scored.cost));
         let next = self.causes_unlike(library, candidate).filter_map(worth).fold(0.0, f64::max);
         self.trial(candidate).and_then(worth).is_some_and(|own| next < MOST_OF_IT * own)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
+    use inference::likelihood::setting;
+    use shared_mem::msg::MAX_JOINTS;
+    use worlds::world::Kind;
+
+    /// Twelve clips that are likelier by so much together [nats].
+    pub(in super::super) fn likelier(nats: f64) -> Predicted {
+        Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() }
+    }
+
+    pub(in super::super) fn trial(library: &Library, candidate: usize, (fitted, nats): (&Hypothesis, f64)) -> Trial {
+        Trial {
+            scored: Scored { signal: 30.0, ..nothing_said_of(library, candidate) },
+            fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
+            closes: 0.9,
+            own_numbers: false,
+        }
+    }
+
+    pub(in super::super) fn step(from: &Hypothesis, trials: Vec<Trial>) -> Step {
+        Step {
+            from: from.clone(),
+            trials,
+            predicted: likelier(0.0),
+            weights: vec![1.0; 4 * MAX_JOINTS],
+            arm_rows: 100,
+            left: Vec::new(),
+            whole: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_load_explains_before_the_zeros_of_torque_sensors_that_do_no_better() {
+        let (cell, base) = (shipped(), setting::complete(&shipped(), None).expect("a cell"));
+        let world = with_effect("payload", 3, Kind::Excitation, &cell);
+        let library = Library::new(&cell, &base, None, &[87.0; MAX_JOINTS]);
+        let [load, zeros] = ["payload", "torque_sensor_bias"].map(|name| library.find(name).expect("a candidate"));
+        on_bench((&cell, &world), &library, |bench, even| {
+            let mut full = truth(&library, &world);
+            library.candidates[zeros].sizes.iter().for_each(|k| full[*k] = 1.0);
+            let fit = bench.fit(&[load], full, &[0, 1], even, None, ONCE).expect("a fit");
+            let named = |of_zeros: f64| {
+                let trials = [(load, 300.0), (zeros, of_zeros)];
+                let step = step(&fit, trials.map(|(k, nats)| trial(&library, k, (&fit, nats))).to_vec());
+                step.best(bench).map(|(trial, ..)| trial.scored.candidate)
+            };
+            assert_eq!(named(299.0), Some(load));
+            // Seven numbers against one: worth the same.
+            assert_eq!(named(304.0), Some(load));
+            assert_eq!(named(400.0), Some(zeros), "what predicts better is not held back");
+        });
     }
 }
