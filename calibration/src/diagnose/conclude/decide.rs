@@ -3,8 +3,9 @@
 
 use super::Case;
 use super::measure::Measures;
-use super::verdict::{Decision, Finding};
+use super::verdict::{Decision, Finding, Power};
 use crate::answer::diagnosis::Kind;
+use crate::diagnose::fit::shortlist::TESTABLE;
 use crate::diagnose::judge::held_out::Measured;
 use crate::diagnose::judge::needed::FinalModel;
 use crate::diagnose::judge::partly::{self, Partly};
@@ -80,7 +81,20 @@ fn finding<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Finding<
         implausible: !remainder::implausible(bench, &measures.with.of_all).is_empty(),
         within_tolerance: measures.within_tolerance,
         drift: drift::of_friction(&bench.scatter, &measures.with.of_all),
+        power: power(case),
     }
+}
+
+/// Of how many effects the clips would show anything, by their signatures around the baseline.
+fn power<E: Evidence>(case: &Case<'_, E>) -> Power {
+    let trials = &case.first().trials;
+    let blind = trials.iter().filter(|trial| trial.scored.signal < TESTABLE);
+    // A signal grows with the size.
+    let mut not_shown: Vec<(&'static str, f64)> = blind
+        .map(|trial| (case.name(trial.scored.candidate), TESTABLE / trial.scored.signal.max(f64::MIN_POSITIVE)))
+        .collect();
+    not_shown.sort_by(|a, b| a.1.total_cmp(&b.1));
+    Power { shown: trials.len() - not_shown.len(), all: trials.len(), not_shown }
 }
 
 /// How sure the weakest of the effects that were found is.

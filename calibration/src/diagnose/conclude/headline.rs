@@ -4,6 +4,7 @@ use super::verdict::{Decision, Finding};
 use crate::answer::diagnosis::{Kind, Share};
 use crate::diagnose::judge::closing::MIN_SHARE_CLOSED;
 use crate::diagnose::judge::gap::Shrunk;
+use crate::words::quantity::UNBOUNDED;
 use crate::words::{percent, words};
 
 /// What the sentence is made of, beside the finding itself.
@@ -66,8 +67,22 @@ pub(super) fn sentence(decision: &Decision, finding: &Finding<'_>, facts: &Facts
         Kind::None => none(finding, facts),
         Kind::Named => named(finding, facts),
         Kind::Class => class(finding, facts),
-        Kind::Unexplained | Kind::NotTestable => unexplained(decision, finding, facts),
+        Kind::Unexplained => unexplained(decision, finding, facts),
+        Kind::NotTestable => not_shown(finding, facts),
     }
+}
+
+fn not_shown(finding: &Finding<'_>, Facts { size, .. }: &Facts) -> String {
+    let power = &finding.power;
+    let nearest = power.not_shown.first().filter(|(_, times)| *times < UNBOUNDED);
+    let nearest = nearest.map_or_else(String::new, |(name, times)| {
+        format!("; the nearest of the others, {}, from {times:.1} times that size on", words(name))
+    });
+    format!(
+        "Not testable: with the parameters identified, twin and cell differ by {size}, but of {} effects these clips would show {} at the \
+         largest size that is plausible{nearest}.",
+        power.all, power.shown
+    )
 }
 
 fn none(finding: &Finding<'_>, Facts { size, .. }: &Facts) -> String {
@@ -201,6 +216,7 @@ fn size_and_place(Facts { size, place, .. }: &Facts) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::verdict::Power;
     use super::super::verdict::tests::finding;
     use super::*;
 
@@ -304,6 +320,15 @@ mod tests {
         );
         let worn = Finding { drift: Some(0.38), ..finding(vec![], 4.0, 4.0) };
         assert!(said(&worn, &[]).contains("the friction rises by 38 %"));
+    }
+
+    #[test]
+    fn where_hardly_an_effect_would_be_seen_it_is_said_from_which_size_on_it_would() {
+        let not_shown = vec![("payload", 2.51), ("torque_ripple", 1e200)];
+        let blind = Finding { power: Power { shown: 2, all: 20, not_shown }, ..finding(vec![], 1.5, 1.5) };
+        let text = said(&blind, &[]);
+        assert!(text.contains("of 20 effects these clips would show 2 at the largest size"), "{text}");
+        assert!(text.ends_with("the nearest of the others, payload, from 2.5 times that size on."), "{text}");
     }
 
     #[test]

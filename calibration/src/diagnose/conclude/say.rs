@@ -10,13 +10,13 @@ use crate::answer::Trace;
 use crate::answer::diagnosis::{Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Rest, Verdict};
 use crate::diagnose::criteria::CLASS_IS_RIGHT;
 use crate::diagnose::fit::bench::Hypothesis;
-use crate::diagnose::judge::ends;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out::Measured;
 use crate::diagnose::judge::localise::localise;
 use crate::diagnose::judge::partly::Partly;
 use crate::diagnose::judge::sizes::Sizes;
 use crate::diagnose::judge::unproven::{Unproven, unproven};
+use crate::diagnose::judge::{apart, ends};
 use crate::diagnose::work::{DiagnoseError, Options};
 use crate::words::{channel_in_words, words};
 use inference::admit::{Admitted, COMMANDS_TO_CHOOSE_BY, Split};
@@ -155,15 +155,17 @@ fn clips(admitted: &Admitted, split: &Split) -> Clips {
 
 /// What has to be known beside the answer: of the recording, of few commands, of effects as strong as they are looked for.
 fn warnings<E: Evidence>(case: &Case<'_, E>, shown: &Hypothesis) -> Vec<String> {
-    let ended =
-        shown.effects.iter().filter(|effect| !ends::stopped(case.bench.library, **effect, &shown.full).is_empty());
+    let Hypothesis { full, effects, .. } = shown;
+    let ended = effects.iter().filter(|effect| !ends::stopped(case.bench.library, **effect, full).is_empty());
     let sentence = |effect: &usize| {
         let name = words(case.name(*effect));
         format!(
             "{name} was found as strong as it is looked for: it may be stronger, or something else that looks like it"
         )
     };
-    case.admitted.warnings.iter().cloned().chain(few(case.admitted, case.split)).chain(ended.map(sentence)).collect()
+    let known = case.admitted.warnings.iter().cloned().chain(few(case.admitted, case.split));
+    let apart = apart::of_joints(case.bench, shown);
+    known.chain(ended.map(sentence)).chain(ends::of_gains(case.bench.library, full)).chain(apart).collect()
 }
 
 /// What has to be known about clips of few commands.
@@ -218,9 +220,8 @@ fn next(verdict: &Verdict, decided: &Decided<'_>, largest: Option<&Place>, site:
         Kind::Named if open() => advice::unexplained(largest, site),
         Kind::None => advice::nothing_open(site),
         Kind::Named => advice::confirming(&verdict.effects, site),
-        Kind::Class | Kind::NotTestable => {
-            advice::separating(&verdict.effects.iter().map(String::as_str).collect::<Vec<_>>(), site)
-        }
+        Kind::Class => advice::separating(&verdict.effects.iter().map(String::as_str).collect::<Vec<_>>(), site),
+        Kind::NotTestable => advice::lacking("motions in which most effects show", site),
     }
 }
 

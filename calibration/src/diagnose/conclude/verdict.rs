@@ -1,7 +1,9 @@
 //! The finding: one of five verdicts, with the effects and how sure it is. [`super::headline`] says it in a sentence.
 
 use crate::answer::diagnosis::{Basis, Kind, SensorGap, Verdict};
-use crate::diagnose::criteria::{CLASS_IS_RIGHT, NONE_IS_RIGHT, UNKNOWN_IS_RIGHT, UNKNOWN_OF_LITTLE_IS_RIGHT};
+use crate::diagnose::criteria::{
+    CLASS_IS_RIGHT, MOST_OF_IT, NONE_IS_RIGHT, UNKNOWN_IS_RIGHT, UNKNOWN_OF_LITTLE_IS_RIGHT,
+};
 use crate::diagnose::judge::confidence;
 use std::time::Duration;
 
@@ -28,6 +30,24 @@ pub(super) struct Finding<'a> {
     pub(super) within_tolerance: [bool; 2],
     /// How much the friction of the last clip is over that of the first, less 1, where it drifts over the session.
     pub(super) drift: Option<f64>,
+    pub(super) power: Power,
+}
+
+/// Of how many effects these clips would show anything.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Power {
+    /// Those that would be seen at the largest size that is plausible.
+    pub(super) shown: usize,
+    pub(super) all: usize,
+    /// Those that would not, each with the multiple of that size from which on it would be, the smallest first.
+    pub(super) not_shown: Vec<(&'static str, f64)>,
+}
+
+impl Power {
+    /// Whether so much would be seen that it says something that nothing was.
+    fn is_enough(&self) -> bool {
+        self.shown as f64 >= MOST_OF_IT * self.all as f64
+    }
 }
 
 /// The verdict without its sentence.
@@ -116,6 +136,9 @@ impl Finding<'_> {
         let nothing = self.left.iter().map(SensorGap::is_nothing).fold(1.0, f64::min);
         // What is of no interest is a matter of size, which is measured.
         let nothing = if self.within_tolerance[0] { 1.0 } else { nothing };
+        if !self.within_tolerance[0] && !self.power.is_enough() {
+            return Decision { kind: Kind::NotTestable, effects: Vec::new(), confidence: 1.0, little: false };
+        }
         Decision { kind: Kind::None, effects: Vec::new(), confidence: NONE_IS_RIGHT.value * nothing, little: false }
     }
 
@@ -182,6 +205,7 @@ pub(in crate::diagnose) mod tests {
             implausible: false,
             within_tolerance: [false; 2],
             drift: None,
+            power: Power::default(),
         }
     }
 
@@ -205,6 +229,16 @@ pub(in crate::diagnose) mod tests {
         assert!(rough.kind == Kind::None && (0.4..0.7).contains(&rough.confidence), "{rough:?}");
         assert!(far.kind == Kind::Unexplained && far.confidence < 0.5 && far.little, "{far:?}");
         assert!(object(100.0).confidence > 0.6 && !object(100.0).little);
+    }
+
+    #[test]
+    fn where_most_effects_would_not_be_seen_nothing_can_be_said_but_of_what_is_of_no_interest() {
+        let blind = Power { shown: 3, all: 20, not_shown: vec![("payload", 2.5)] };
+        let nothing = Finding { power: blind, ..finding(vec![], 1.5, 1.5) };
+        assert_eq!(nothing.decide().kind, Kind::NotTestable);
+        assert_eq!(Finding { within_tolerance: [true; 2], ..nothing.clone() }.decide().kind, Kind::None);
+        let seen = Power { shown: 12, all: 20, not_shown: Vec::new() };
+        assert_eq!(Finding { power: seen, ..nothing }.decide().kind, Kind::None);
     }
 
     #[test]

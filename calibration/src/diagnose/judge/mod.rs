@@ -6,6 +6,7 @@
 //! | `held_out` | numbers for clips that it was not fitted to |
 //! | `confirm` | whether held-out clips speak for what was found |
 //! | `closing` | how much of the gap it closes |
+//! | `apart` | whether a time that all joints share is each joint's own |
 //! | `ends` | which of its sizes stopped at an end of their search |
 //! | `remainder`, `drift` | what it leaves |
 //! | `gap`, `localise`, `sizes` | how large the gap is, and where |
@@ -17,6 +18,7 @@
 //! | `confidence` | how sure a finding is, and what its rivals are |
 //! | `trial` | candidates tried on top of a hypothesis, and what makes one of them a cause |
 
+pub(super) mod apart;
 pub mod closing;
 pub mod confidence;
 pub(super) mod confirm;
