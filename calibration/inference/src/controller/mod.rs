@@ -38,7 +38,8 @@ pub enum ControllerError {
     Impossible(#[from] Impossible),
 }
 
-/// The cell with what its clips say of the controller: the law and what it is given between commands where they are not stated, and the stiffness where torques tell it.
+/// The cell with what its clips say of the controller: the law and what it is given between commands where they are not stated, and the
+/// stiffness where torques tell it.
 /// `given`: parameters that are known already; then gains are not looked for. `remarks`: one sentence for each that was found.
 ///
 /// # Errors

@@ -111,7 +111,7 @@ pub(super) fn evened(clip: &mut Clip) -> Option<String> {
     if let Some(commands) = Clock::of(&clip.desired.stamps_ns).filter(Clock::is_white) {
         clip.desired.stamps_ns = commands.even();
     }
-    // Without its number, so that clips are told together.
+    // Without its number, so that clips of one kind share a line.
     Some("its stamps jitter while its positions go on evenly: rows are taken as those of an even clock".into())
 }
 
