@@ -73,7 +73,8 @@ pub(super) fn conclude<E: Evidence>(
         options.seed,
     );
     let (gap_of_a, places) = (of_a(pair_bench, case), localise::localise(pair_bench.bench.evidence, before));
-    let candidates = candidates(pair_bench, case, &Judged { kind, rivals: &rivals, power: &power }, before, options.seed);
+    let candidates =
+        candidates(pair_bench, case, &Judged { kind, rivals: &rivals, power: &power }, before, options.seed);
     let changes: Vec<String> = if believed { named(case, &rivals) } else { Vec::new() };
     let facts = Facts::of(&candidates, gap.shrink, deviates.unwrap_or(1.0), places.first());
     let text = headline::sentence(kind, &facts);
