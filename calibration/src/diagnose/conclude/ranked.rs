@@ -168,6 +168,7 @@ mod tests {
     use crate::diagnose::fit::bench::Hypothesis;
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::judge::score::Predicted;
+    use crate::diagnose::judge::trial::BesideContact;
 
     fn hypothesis(effects: &[usize]) -> Hypothesis {
         Hypothesis { effects: effects.to_vec(), full: Vec::new(), free: Vec::new(), fitted: Vec::new() }
@@ -192,6 +193,7 @@ mod tests {
             fitted: fitted.then(|| (hypothesis(&[from, &[*candidate]].concat()), predicted.over(&predicted))),
             closes: 0.0,
             own_numbers: true,
+            beside_contact: BesideContact::default(),
         };
         Step {
             from: hypothesis(from),

@@ -204,7 +204,7 @@ mod tests {
     use crate::diagnose::fit::bench::Hypothesis;
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::judge::score::Predicted;
-    use crate::diagnose::judge::trial::Step;
+    use crate::diagnose::judge::trial::{BesideContact, Step};
     use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped};
     use worlds::world::{Fault, World};
 
@@ -230,6 +230,7 @@ mod tests {
                 fitted: nats.map(|nats| (hypothesis(&[candidate], &start), likelier(nats).over(&likelier(0.0)))),
                 closes,
                 own_numbers: false,
+                beside_contact: BesideContact::default(),
             };
             let found = |candidate: Trial| {
                 let step = |from: &[usize], trials: Vec<Trial>| Step {

@@ -47,6 +47,7 @@ pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64
 #[cfg(test)]
 mod tests {
     use super::super::score::Predicted;
+    use super::super::trial::BesideContact;
     use super::*;
 
     use crate::diagnose::fit::bench::{FittedClip, Hypothesis};
@@ -77,7 +78,13 @@ mod tests {
             p: 0.0,
         };
         let fit = Hypothesis { effects: vec![candidate], full: Vec::new(), free: Vec::new(), fitted: Vec::new() };
-        Trial { scored, fitted: Some((fit, predicted(nats).over(&predicted(0.0)))), closes, own_numbers: true }
+        Trial {
+            scored,
+            fitted: Some((fit, predicted(nats).over(&predicted(0.0)))),
+            closes,
+            own_numbers: true,
+            beside_contact: BesideContact::default(),
+        }
     }
 
     #[test]

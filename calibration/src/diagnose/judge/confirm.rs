@@ -18,6 +18,8 @@ use inference::likelihood::Evidence;
 pub(in crate::diagnose) struct Confirmation {
     /// Whether they speak for it.
     pub(in crate::diagnose) holds: bool,
+    /// Whether clips with an object are predicted better, however much of the gap closes.
+    pub(in crate::diagnose) better: bool,
     /// How far the gap shrinks.
     pub(in crate::diagnose) shrink: Shrunk,
 }
@@ -34,21 +36,25 @@ pub(in crate::diagnose) fn confirm<E: Evidence>(
 ) -> Result<Confirmation, DiagnoseError> {
     let left = both.map(|held_out| &held_out.left);
     let (shrink, mean) = (left[1].shrunk(left[0], seed), mean(left));
-    let holds = if bench.scatter.count() > 0 {
+    let (better, holds) = if bench.scatter.count() > 0 {
         let [before, after] = both.map(|held_out| predict_unseen(bench, &held_out.fits, weights));
         let (before, after) = before.zip(after).ok_or(DiagnoseError::NoBaseline)?;
-        speaks_for(&after.over(&before), &shrink, mean)
+        let gain = after.over(&before);
+        (is_better(&gain), speaks_for(&gain, &shrink, mean))
     } else {
-        shrinks_in_most(&shrink, mean)
+        (false, shrinks_in_most(&shrink, mean))
     };
-    Ok(Confirmation { holds, shrink })
+    Ok(Confirmation { holds, better, shrink })
 }
 
 /// Whether clips with an object speak for it: more of them are predicted better than worse, in sum by more than its standard error,
 /// and enough of the gap closes: in the mean of squares, or in a clip like most.
 fn speaks_for(gain: &Gain, shrink: &Shrunk, mean: f64) -> bool {
-    let better = gain.share > 0.5 && gain.nats > gain.error;
-    better && mean.max(shrink.usual.value).max(shrink.contact.value) > MIN_SHARE_CLOSED
+    is_better(gain) && mean.max(shrink.usual.value).max(shrink.contact.value) > MIN_SHARE_CLOSED
+}
+
+fn is_better(gain: &Gain) -> bool {
+    gain.share > 0.5 && gain.nats > gain.error
 }
 
 /// The same of clips of the arm alone, which have no nuisance parameters. Their likelihood is nothing but their residuals, and weighs

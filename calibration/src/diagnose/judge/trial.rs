@@ -19,6 +19,9 @@ pub(in crate::diagnose) const MIN_NATS_PER_ROW: f64 = 0.0025;
 pub(in crate::diagnose) const LARGE_SHARE_CLOSED: f64 = 0.2;
 /// A gain of so many of its standard errors is no chance.
 pub(super) const NO_CHANCE_SIGMAS: f64 = 3.5;
+/// A gain of so many of its standard errors is none of what engines differ by in contact either (a choice; of 120 candidates in ten sessions
+/// of another engine with nothing wrong none gained more than 3.7).
+const UNMISTAKABLE_SIGMAS: f64 = 5.0;
 /// More parameters make a gain larger by this share whatever acts: friction at rest is every engine's own.
 const NUMERICS_OF_GAIN: f64 = 1e-3;
 /// Where nuisance parameters of clips hide what a candidate closes from the likelihood, one that has more parameters than another must
@@ -36,12 +39,33 @@ pub struct Trial {
     pub closes: f64,
     /// Whether clips have nuisance parameters.
     pub own_numbers: bool,
+    /// What shows it apart from the gap that contact leaves.
+    pub beside_contact: BesideContact,
+}
+
+/// What shows a candidate in strokes apart from the gap. Engines, and an engine and a cell, differ in contact by more than a camera that
+/// is off by a millimetre does: of such a cause little of the gap closes, and what shows it does not come from contact.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct BesideContact {
+    /// Whether it acts on what a camera sees alone.
+    pub of_camera: bool,
+    /// Whether a single stage shows it ([`inference::witness`]), and as strong as it was fitted.
+    pub in_a_stage: bool,
 }
 
 impl Trial {
-    /// Whether enough of the gap closes with it for a cause, however much better the clips are predicted.
+    /// Whether enough of the gap closes with it for a cause, however much better the clips are predicted, or it shows beside that.
     pub fn is_cause(&self) -> bool {
-        self.closes > MIN_SHARE_CLOSED
+        self.closes > MIN_SHARE_CLOSED || self.shows_beside_contact()
+    }
+
+    /// Whether it shows apart from the gap that contact leaves: a single stage shows it, or it is of the camera and nearly all clips
+    /// speak for it, beyond any chance.
+    pub fn shows_beside_contact(&self) -> bool {
+        let Some(gain) = self.gain() else { return false };
+        let beyond_chance = gain.in_nearly_all() && gain.nats > UNMISTAKABLE_SIGMAS * gain.error;
+        let in_a_stage = self.beside_contact.in_a_stage && gain.nats > 0.0;
+        in_a_stage || self.beside_contact.of_camera && beyond_chance
     }
 
     /// What it is worth, where it was fitted.
@@ -116,6 +140,15 @@ impl Found {
     }
 }
 
+impl Found {
+    /// Whether each of the effects that were kept shows apart from the gap that contact leaves.
+    pub fn shows_beside_contact(&self) -> bool {
+        let shows =
+            |(place, effect): (usize, usize)| self.steps[place].trial(effect).is_some_and(Trial::shows_beside_contact);
+        !self.last.effects.is_empty() && self.kept().all(shows)
+    }
+}
+
 impl Step {
     /// The trial that is worth most among those worth it. Of those that are worth the same as far as clips tell, what has a mass, a
     /// length or a friction behind it explains before what needs none.
@@ -149,7 +182,8 @@ impl Step {
         let may_show = shown || self.from.effects.is_empty();
         let plain = much && gain.in_nearly_all() && gain.nats > EFFECTS.min_gain_nats && may_show;
         let proven = EFFECTS.proves(gain, trial.scored.cost) && shown;
-        (proven || plain)
+        let beside_contact = trial.shows_beside_contact() && gain.nats > EFFECTS.price(trial.scored.cost);
+        (proven || plain || beside_contact)
             && (!of_arm || gain.nats > MIN_NATS_PER_ROW * self.arm_rows as f64)
             && trial.is_cause()
             && !bench.negligible(candidate, &fit.full)
@@ -241,6 +275,7 @@ pub(super) mod tests {
             fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
             closes: 0.9,
             own_numbers: false,
+            beside_contact: BesideContact::default(),
         }
     }
 

@@ -150,7 +150,7 @@ mod tests {
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::judge::gap::Typical;
     use crate::diagnose::judge::score::Predicted;
-    use crate::diagnose::judge::trial::Trial;
+    use crate::diagnose::judge::trial::{BesideContact, Trial};
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
     use inference::admit::Split;
@@ -174,6 +174,7 @@ mod tests {
             fitted: None,
             closes: 0.0,
             own_numbers: true,
+            beside_contact: BesideContact::default(),
         };
         let step = Step {
             from: bench.fit(&[], full, &[0, 1], even, None, PROBE).expect("a fit"),

@@ -21,6 +21,7 @@ use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
 use inference::admit::Split;
 use inference::likelihood::{Evidence, Likelihood};
+use inference::witness::Witness;
 use shared_mem::progress::Progress;
 
 /// What every step of a search for effects is given.
@@ -29,8 +30,8 @@ pub(in crate::diagnose) struct Search<'a, E> {
     pub(in crate::diagnose) split: &'a Split,
     /// Numbers whose object is found anew under the effects in them; `None` where there is no object.
     pub(in crate::diagnose) refined: &'a dyn Fn(&[f64]) -> Option<Vec<f64>>,
-    /// Candidates that single stages show beyond the effects in these numbers.
-    pub(in crate::diagnose) witnessed: &'a dyn Fn(&[f64]) -> Vec<usize>,
+    /// What single stages show beyond the effects in these numbers.
+    pub(in crate::diagnose) witnessed: &'a dyn Fn(&[f64]) -> Vec<Witness>,
     pub(in crate::diagnose) bar: &'a Progress,
 }
 

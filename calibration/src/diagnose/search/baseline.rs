@@ -19,7 +19,7 @@ use inference::likelihood::object::ObjectClips;
 use inference::likelihood::setting::{complete, object_parameters};
 use inference::likelihood::{Evidence, Likelihood, Settings};
 use inference::object_fit::fit_object;
-use inference::witness;
+use inference::witness::{self, Witness};
 use shared_mem::cell::Cell;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Clip;
@@ -115,17 +115,12 @@ impl<E: Evidence> Baseline<'_, E> {
         effects::search(&search, baseline)
     }
 
-    /// Candidates that single stages show beyond the effects in these numbers.
-    fn witnessed(&self, full: &[f64]) -> Vec<usize> {
+    /// What single stages show beyond the effects in these numbers.
+    fn witnessed(&self, full: &[f64]) -> Vec<Witness> {
         if !self.admitted.with_object {
             return Vec::new();
         }
-        let all = witness::beyond(self.cell, &self.admitted.clips, &self.bench.library.theta(full));
-        let shown = all.iter().filter(|witness| witness.is_significant());
-        let mut found: Vec<usize> = shown.filter_map(|witness| self.bench.library.find(witness.effect)).collect();
-        found.sort_unstable();
-        found.dedup();
-        found
+        witness::beyond(self.cell, &self.admitted.clips, &self.bench.library.theta(full))
     }
 }
 

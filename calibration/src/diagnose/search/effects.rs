@@ -5,23 +5,25 @@
 //! is fitted to that program itself.
 
 use super::again::{by_engine, found_by_engine, reconsidered, rivals_refitted, without_the_best};
+use super::in_stages;
 use super::refit::{fewer, refitted};
 use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::criteria::{JOINTS_EXCESS_BESIDE_A_CAUSE, OBJECT_EXCESS};
 use crate::diagnose::fit::anchored::Anchored;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT, SCREENING};
-use crate::diagnose::fit::shortlist::MAX_FORMS;
+use crate::diagnose::fit::shortlist::{MAX_FORMS, Scored};
 use crate::diagnose::fit::{floor, stages, undetermined};
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::score::predict;
-use crate::diagnose::judge::trial::{Found, Step, Trial};
+use crate::diagnose::judge::trial::{BesideContact, Found, Step, Trial};
 use crate::diagnose::propose::screening::{arm_gap_is_open, overlooked, seen_at_the_least_scatter, to_fit};
 use crate::diagnose::propose::starts;
 use crate::diagnose::propose::{Around, Search, arm_alone, signatures};
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::forward::{Selection, backward, forward};
 use inference::likelihood::{Evidence, Group, Row};
+use twin::effects::Stage;
 
 /// So often at most the steps of a search are begun anew from a better fit of what they extend (a choice).
 const MAX_RESTARTS: usize = 2;
@@ -122,7 +124,7 @@ fn is_spent<E: Evidence>(search: &Search<'_, E>, first: &Step, now: &Hypothesis)
     SensorGap::of_groups(&before, &after).iter().all(|left| {
         let numerics = if left.of_object() { OBJECT_EXCESS } else { JOINTS_EXCESS_BESIDE_A_CAUSE };
         left.after - left.floor <= numerics.value.max(NUMERICS_OF_GAP * (left.before - left.floor))
-    })
+    }) && in_stages::shown(search, &now.full).is_empty()
 }
 
 /// Sweeps around a hypothesis, scores all candidates, fits the best. `first`: the first step, where this is not the first.
@@ -140,10 +142,17 @@ fn tried<E: Evidence>(search: &Search<'_, E>, from: &Hypothesis, first: Option<&
     }
     let own_numbers = bench.scatter.count() > 0;
     // What a stage shows by itself is fitted whatever slopes of roll-outs say.
-    let others: Vec<usize> = scored.iter().map(|s| s.candidate).filter(|other| !promising.contains(other)).collect();
-    promising.extend((search.witnessed)(&step.from.full).into_iter().filter(|shown| others.contains(shown)));
-    let trials = scored.into_iter().map(|scored| Trial { scored, fitted: None, closes: 0.0, own_numbers }).collect();
-    let step = fitted(search, Step { trials, ..step }, &promising, false);
+    let shown = in_stages::shown(search, &step.from.full);
+    promising.extend(shown.iter().map(|shown| shown.candidate));
+    promising.sort_unstable();
+    promising.dedup();
+    let trial = |scored: Scored| {
+        let of_camera = own_numbers && bench.library.candidates[scored.candidate].effect.stage == Stage::Camera;
+        let beside_contact = BesideContact { of_camera, in_a_stage: false };
+        Trial { scored, fitted: None, closes: 0.0, own_numbers, beside_contact }
+    };
+    let trials = scored.into_iter().map(trial).collect();
+    let step = in_stages::compared(search, fitted(search, Step { trials, ..step }, &promising, false), &shown);
     if step.best(bench).is_some() {
         return Some(step);
     }
