@@ -104,10 +104,7 @@ mod tests {
         assert!(said[0].starts_with(
             "the stage \"contact\" by itself, without a roll-out, shows camera latency or tracker smoothing"
         ));
-        assert!(
-            said[0].ends_with("(latency 20.0 \u{b1} 1.00 ms; 8 clips), which no named effect explains"),
-            "{said:?}"
-        );
+        assert!(said[0].ends_with("(latency 20.0 \u{b1} 1.0 ms; 8 clips), which no named effect explains"), "{said:?}");
     }
 
     #[test]

@@ -75,7 +75,7 @@ mod tests {
         };
         let html = section(&[witness(20.0), witness(0.5)]).into_string();
         assert_eq!((html.matches("<svg").count(), html.matches("<td>contact</td>").count()), (1, 2));
-        assert!(html.contains("latency 20.0 \u{b1} 1.00 ms") && html.contains("tracker smoothing"), "{html}");
+        assert!(html.contains("latency 20.0 \u{b1} 1.0 ms") && html.contains("tracker smoothing"), "{html}");
         assert!(section(&[]).into_string().is_empty());
     }
 }
