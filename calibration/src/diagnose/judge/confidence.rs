@@ -32,7 +32,9 @@ pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64
     let near = |trial: &&Trial| {
         let candidate = trial.scored.candidate;
         let Some(other) = trial.gain().filter(|_| candidate != chosen) else { return false };
-        let alike = best.beyond(other).may_be_none(overdispersion) && other.nats > other.error;
+        // What a stage shows by itself has no equal in what it does not show.
+        let in_no_stage = chosen_trial.beside_contact.in_a_stage && !trial.beside_contact.in_a_stage;
+        let alike = !in_no_stage && best.beyond(other).may_be_none(overdispersion) && other.nats > other.error;
         let dearer = trial.scored.cost > chosen_trial.scored.cost;
         let enough = match dearer {
             true => trial.closes_more_than(chosen_trial),
@@ -129,7 +131,11 @@ mod tests {
             }
             other
         };
-        let trials = vec![trial(tool, 1530.0, 0.5), as_good(camera, 0.15), as_good(friction, 0.15)];
+        let mut trials = vec![trial(tool, 1530.0, 0.5), as_good(camera, 0.15), as_good(friction, 0.15)];
+        assert_eq!(rivals(&step(trials.clone()), &library, tool, 1.0), [camera]);
+        trials[0].beside_contact.in_a_stage = true;
+        assert!(rivals(&step(trials.clone()), &library, tool, 1.0).is_empty(), "a stage shows the first alone");
+        trials[1].beside_contact.in_a_stage = true;
         assert_eq!(rivals(&step(trials), &library, tool, 1.0), [camera]);
     }
 

@@ -154,8 +154,12 @@ impl Step {
     /// length or a friction behind it explains before what needs none.
     pub fn best<E: Evidence>(&self, bench: &Bench<'_, E>) -> Option<(&Trial, &Hypothesis, &Gain)> {
         let fitted = self.trials.iter().filter_map(|trial| trial.fitted.as_ref().map(|(fit, gain)| (trial, fit, gain)));
-        let convincing_ones: Vec<(&Trial, &Hypothesis, &Gain)> =
+        let mut convincing_ones: Vec<(&Trial, &Hypothesis, &Gain)> =
             fitted.filter(|(trial, fit, gain)| self.convinces(bench, trial, fit, gain)).collect();
+        // What a stage shows by itself acts, whatever else may: it comes first.
+        if convincing_ones.iter().any(|(trial, ..)| trial.beside_contact.in_a_stage) {
+            convincing_ones.retain(|(trial, ..)| trial.beside_contact.in_a_stage);
+        }
         let simplest =
             |(trial, ..): &&(&Trial, _, _)| !convincing_ones.iter().any(|(other, ..)| trial.is_outdone_by(other));
         let worth = |trial: &Trial| trial.gain().map_or(0.0, |gain| gain.net(trial.scored.cost));
