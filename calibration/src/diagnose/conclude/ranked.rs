@@ -192,6 +192,7 @@ mod tests {
             },
             fitted: fitted.then(|| (hypothesis(&[from, &[*candidate]].concat()), predicted.over(&predicted))),
             closes: 0.0,
+            closes_of_gap: 0.0,
             own_numbers: true,
             beside_contact: BesideContact::default(),
         };

@@ -229,6 +229,7 @@ mod tests {
                 scored: Scored { cosine: 0.3, gain, p, signal: 30.0, ..nothing_said_of(bench.library, candidate) },
                 fitted: nats.map(|nats| (hypothesis(&[candidate], &start), likelier(nats).over(&likelier(0.0)))),
                 closes,
+                closes_of_gap: closes,
                 own_numbers: false,
                 beside_contact: BesideContact::default(),
             };

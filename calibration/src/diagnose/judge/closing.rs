@@ -14,13 +14,22 @@ pub const MIN_SHARE_CLOSED: f64 = 0.1;
 const MIN_GAP_RATIO: f64 = 1.2;
 
 /// How much of the way is gone between two hypotheses on the clips of a search, of the group of sensors in which it is
-/// largest; 0 where the gap widens on clips that were not fitted. `whole`: what the baseline leaves.
+/// largest; 0 where the gap widens on clips that were not fitted.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Closed {
+    /// With the joints in contact among the groups.
+    pub most: f64,
+    /// Of the groups that have a gap: how joints yield in contact, any two engines differ by.
+    pub of_gap: f64,
+}
+
+/// What closes; `whole`: what the baseline leaves.
 pub fn closes<E: Evidence>(
     bench: &Bench<'_, E>,
     split: &Split,
     whole: &[Typical],
     hypotheses: [&Hypothesis; 2],
-) -> f64 {
+) -> Closed {
     let on = |clips: &[usize]| -> Option<Vec<f64>> {
         let [before, after] = hypotheses.map(|hypothesis| Residuals::at(bench, hypothesis, clips));
         let (before, after) = (before?, after?);
@@ -30,9 +39,10 @@ pub fn closes<E: Evidence>(
         let contact = in_contact.map(|(before, after)| way(before.mean_square, after.mean_square, before.floor));
         Some(shares.chain(contact).collect())
     };
-    let (Some(all), Some(choose)) = (on(&split.searched()), on(split.elsewhere())) else { return 0.0 };
+    let (Some(all), Some(choose)) = (on(&split.searched()), on(split.elsewhere())) else { return Closed::default() };
     let harmless = |(_, choose): &(&f64, &f64)| **choose > -MIN_SHARE_CLOSED;
-    all.iter().zip(&choose).filter(harmless).map(|(all, _)| *all).fold(0.0, f64::max)
+    let most = |of: &[f64]| of.iter().zip(&choose).filter(harmless).map(|(all, _)| *all).fold(0.0, f64::max);
+    Closed { most: most(&all), of_gap: most(&all[..whole.len().min(all.len())]) }
 }
 
 /// How much of the way from the gap down to noise is gone, on a logarithmic scale.

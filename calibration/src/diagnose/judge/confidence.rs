@@ -84,6 +84,7 @@ mod tests {
             scored,
             fitted: Some((fit, predicted(nats).over(&predicted(0.0)))),
             closes,
+            closes_of_gap: closes,
             own_numbers: true,
             beside_contact: BesideContact::default(),
         }

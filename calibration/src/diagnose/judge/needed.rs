@@ -91,7 +91,7 @@ impl<'a, E: Evidence> FinalModel<'a, E> {
             let step = &found.steps[place];
             let without = self.without(effect)?;
             let trial = step.trial(effect)?;
-            let closed = closes(self.bench, self.split, &step.whole, [&without.fit, self.last]);
+            let closed = closes(self.bench, self.split, &step.whole, [&without.fit, self.last]).most;
             if !is_plain(&without.gain, closed, trial.scored.cost) {
                 return None;
             }

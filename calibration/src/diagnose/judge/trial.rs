@@ -35,8 +35,10 @@ pub struct Trial {
     pub scored: Scored,
     /// Fitted, where that was worth it.
     pub fitted: Option<(Hypothesis, Gain)>,
-    /// [`closes`]: how much of the gap.
+    /// [`closes`]: how much of the gap, the joints in contact among it.
     pub closes: f64,
+    /// The same without these.
+    pub closes_of_gap: f64,
     /// Whether clips have nuisance parameters.
     pub own_numbers: bool,
     /// What shows it apart from the gap that contact leaves.
@@ -179,7 +181,7 @@ impl Step {
     /// Whether it is no chance that a trial gains this, and what it gains no numerics.
     fn convinces<E: Evidence>(&self, bench: &Bench<'_, E>, trial: &Trial, fit: &Hypothesis, gain: &Gain) -> bool {
         let (library, candidate) = (bench.library, trial.scored.candidate);
-        let (of_arm, much) = (library.is_of_arm(candidate), trial.closes > LARGE_SHARE_CLOSED);
+        let (of_arm, much) = (library.is_of_arm(candidate), trial.closes_of_gap > LARGE_SHARE_CLOSED);
         // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing ...
         let shown = of_arm || self.object_gap() || (much && self.is_alone(library, candidate));
         // ... and beside a cause that was found before, a gain on nearly all of them neither.
@@ -203,18 +205,20 @@ impl Step {
     ) -> Self {
         for (place, fit) in fits {
             if let Some(predicted) = predict(bench, &fit, &split.choose, &self.weights) {
-                let closes = closes(bench, split, &self.whole, [&self.from, &fit]);
+                let closed = closes(bench, split, &self.whole, [&self.from, &fit]);
                 let gain = predicted.over(&self.predicted);
                 let name = bench.library.name(fit.effects.last().copied().unwrap_or_default());
                 let ranks = gain.rank_sigmas();
                 tracing::debug!(
-                    "{name}: {:.0} +- {:.0} nats, {:.0} % of clips, ranks {ranks:.1} sigma, closes {closes:.2}",
+                    "{name}: {:.0} +- {:.0} nats, {:.0} % of clips, ranks {ranks:.1} sigma, closes {:.2}",
                     gain.nats,
                     gain.error,
-                    100.0 * gain.share
+                    100.0 * gain.share,
+                    closed.most
                 );
                 let trial = &mut self.trials[place];
-                (trial.closes, trial.fitted) = (closes, Some((fit, gain)));
+                (trial.closes, trial.closes_of_gap) = (closed.most, closed.of_gap);
+                trial.fitted = Some((fit, gain));
             }
         }
         self
@@ -278,6 +282,7 @@ pub(super) mod tests {
             scored: Scored { signal: 30.0, ..nothing_said_of(library, candidate) },
             fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
             closes: 0.9,
+            closes_of_gap: 0.9,
             own_numbers: false,
             beside_contact: BesideContact::default(),
         }

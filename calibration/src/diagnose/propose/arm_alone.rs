@@ -173,6 +173,7 @@ mod tests {
             scored: nothing_said_of(bench.library, *candidate),
             fitted: None,
             closes: 0.0,
+            closes_of_gap: 0.0,
             own_numbers: true,
             beside_contact: BesideContact::default(),
         };
