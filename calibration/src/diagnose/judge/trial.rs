@@ -301,6 +301,27 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_camera_that_is_off_by_little_is_a_cause_where_nearly_all_clips_speak_for_it_or_a_stage_shows_it() {
+        let cell = shipped();
+        let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), None, &[87.0; MAX_JOINTS]);
+        let fit = Hypothesis { effects: vec![0], full: Vec::new(), free: Vec::new(), fitted: Vec::new() };
+        let cause = |nats: &dyn Fn(usize) -> f64, beside_contact| {
+            let predicted = |nats: &dyn Fn(usize) -> f64| Predicted {
+                clips: (0..12).map(|clip| (clip, 1000.0 - 2.0 * nats(clip))).collect(),
+            };
+            let gain = predicted(nats).over(&predicted(&|_| 0.0));
+            let little = Trial { closes: 0.05, closes_of_gap: 0.05, beside_contact, ..trial(&library, 0, (&fit, 0.0)) };
+            Trial { fitted: Some((fit.clone(), gain)), ..little }.is_cause()
+        };
+        let (in_all, in_most) = (|clip| 20.0 + (clip % 4) as f64, |clip| if clip % 4 == 0 { -9.0 } else { 20.0 });
+        let of_camera = BesideContact { of_camera: true, in_a_stage: false };
+        assert!(cause(&in_all, of_camera) && !cause(&in_most, of_camera));
+        assert!(!cause(&in_all, BesideContact::default()), "engines differ so in contact");
+        let in_a_stage = BesideContact { of_camera: false, in_a_stage: true };
+        assert!(cause(&in_most, in_a_stage) && !cause(&|_| -1.0, in_a_stage));
+    }
+
+    #[test]
     fn a_load_explains_before_the_zeros_of_torque_sensors_that_do_no_better() {
         let (cell, base) = (shipped(), setting::complete(&shipped(), None).expect("a cell"));
         let world = with_effect("payload", 3, Kind::Excitation, &cell);
