@@ -284,7 +284,7 @@ mod tests {
             in_part(&facts(&["command lag (lag 15.4 ms)"]), &share, false, "0.40 mrad RMS", Some("payload"), &[]);
         assert_eq!(
             text,
-            "command lag (lag 15.4 ms) explains 96 % of the squared gap (94 % to 98 %), 2.13 mrad RMS, largest in joint 2 \
+            "command lag (lag 15.4 ms) explains 96 % (94 % to 98 %) of the squared gap, 2.13 mrad RMS, largest in joint 2 \
              (reversal): with it in the twin 0.40 mrad RMS stay on held-out clips, largest in yaw (after the slide); payload \
              explains most of that."
         );

@@ -112,7 +112,7 @@ mod tests {
             library.candidates[effect].numbers.clone().for_each(|k| without[k] = library.start()[k]);
             let fit = |effects: &[usize], full| bench.fit(effects, full, &[0, 1], even, None, ONCE).expect("a fit");
             let (baseline, last) = (fit(&[], without), fit(&[effect], with));
-            let split = Split { train: vec![0, 1], choose: vec![1], confirm: vec![1], ..Split::default() };
+            let split = Split { choose: vec![1], ..Split::in_turn(&[vec![0], vec![1]]) };
             let before = Residuals::at(bench, &baseline, &split.confirm).expect("it can be simulated");
             let named = |found: &Found| {
                 let mut found = found.clone();
