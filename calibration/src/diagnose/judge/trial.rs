@@ -19,9 +19,6 @@ pub(in crate::diagnose) const MIN_NATS_PER_ROW: f64 = 0.0025;
 pub(in crate::diagnose) const LARGE_SHARE_CLOSED: f64 = 0.2;
 /// A gain of so many of its standard errors is no chance.
 pub(super) const NO_CHANCE_SIGMAS: f64 = 3.5;
-/// A gain of so many of its standard errors is none of what engines differ by in contact either (a choice; of 120 candidates in ten sessions
-/// of another engine with nothing wrong none gained more than 3.7).
-const UNMISTAKABLE_SIGMAS: f64 = 5.0;
 /// More parameters make a gain larger by this share whatever acts: friction at rest is every engine's own.
 const NUMERICS_OF_GAIN: f64 = 1e-3;
 /// Where nuisance parameters of clips hide what a candidate closes from the likelihood, one that has more parameters than another must
@@ -65,7 +62,7 @@ impl Trial {
     /// speak for it, beyond any chance.
     pub fn shows_beside_contact(&self) -> bool {
         let Some(gain) = self.gain() else { return false };
-        let beyond_chance = gain.in_nearly_all() && gain.nats > UNMISTAKABLE_SIGMAS * gain.error;
+        let beyond_chance = gain.in_nearly_all() && gain.nats > NO_CHANCE_SIGMAS * gain.error;
         let in_a_stage = self.beside_contact.in_a_stage && gain.nats > 0.0;
         in_a_stage || self.beside_contact.of_camera && beyond_chance
     }
