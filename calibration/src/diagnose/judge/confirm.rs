@@ -5,9 +5,8 @@
 //! squares is a matter of single clips; the likelihood knows how far objects deviate, and what the joints in contact show.
 
 use super::closing::MIN_SHARE_CLOSED;
-use super::gap::{Residuals, Shrunk};
+use super::gap::{Residuals, Shrunk, explained};
 use super::held_out::HeldOut;
-use super::remainder;
 use super::score::predict_unseen;
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::select::gain::Gain;
@@ -65,7 +64,7 @@ fn shrinks_in_most(shrink: &Shrunk, mean: f64) -> bool {
 }
 
 fn mean([before, after]: [&Residuals; 2]) -> f64 {
-    remainder::explained(before.mean_square(), after.mean_square(), before.floor())
+    explained(before.mean_square(), after.mean_square(), before.floor())
 }
 
 #[cfg(test)]

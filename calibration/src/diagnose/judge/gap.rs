@@ -3,7 +3,6 @@
 //! A hit on a corner sends an object elsewhere by more than any cause does. So what a clip leaves in the object's poses counts up to
 //! [`MAX_OF_MEDIAN`] times what the clip in the middle does (a Winsorised mean over clips).
 
-use super::remainder;
 use crate::answer::diagnosis::Share;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::select::gain::MAX_OF_MEDIAN;
@@ -159,7 +158,7 @@ impl Residuals {
     fn explained_among(&self, before: &Self, places: &[usize], group: Group) -> Option<f64> {
         let [before, after] = [before, self].map(|residuals| residuals.typical_among(places, group));
         let (before, after) = before.zip(after)?;
-        Some(remainder::explained(before.mean_square, after.mean_square, before.floor))
+        Some(explained(before.mean_square, after.mean_square, before.floor))
     }
 
     /// The shrink `1 - after / before` of the mean square from `before` to this, with an interval from drawing clips anew,
@@ -178,6 +177,12 @@ impl Residuals {
         };
         over_draws(self.pieces.len(), seed, of)
     }
+}
+
+/// Share of what a gap has beyond the noise that is explained.
+pub fn explained(before: f64, after: f64, floor: f64) -> f64 {
+    let excess = before - floor;
+    if excess <= 0.0 { 0.0 } else { ((before - after) / excess).clamp(0.0, 1.0) }
 }
 
 /// A share of so many clips or pieces, with its interval from drawing them anew (bootstrap).

@@ -4,7 +4,7 @@
 //! on some clips and harms on others. What is left is then more than another engine's way of integrating leaves.
 
 use super::ends;
-use super::gap::Typical;
+use super::gap::{Typical, explained};
 use crate::answer::diagnosis::{SensorGap, Sensors};
 use crate::diagnose::criteria::{
     DOUBTFUL_EXCESS, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, MOST_OF_IT, OBJECT_EXCESS,
@@ -70,12 +70,6 @@ impl SensorGap {
     pub fn explained(&self) -> f64 {
         explained(self.before, self.after, self.floor)
     }
-}
-
-/// Share of what a gap has beyond the noise that is explained.
-pub fn explained(before: f64, after: f64, floor: f64) -> f64 {
-    let excess = before - floor;
-    if excess <= 0.0 { 0.0 } else { ((before - after) / excess).clamp(0.0, 1.0) }
 }
 
 /// An effect stronger than what is plausible by more than this share of that range is no cause but a substitute for

@@ -1,8 +1,7 @@
 //! How large the gap is in units of the hand, without effects and with what was found: joints, torques, the object.
 
-use super::gap::Residuals;
+use super::gap::{Residuals, explained};
 use super::held_out::HeldOut;
-use super::remainder;
 use super::tolerance::{self, Measured};
 use crate::answer::diagnosis::{Change, Gap, Medians, SensorGap, TorqueRms};
 use crate::diagnose::work::DiagnoseError;
@@ -98,7 +97,7 @@ impl Sizes {
             after: shown.mean_square(),
             floor: before.floor(),
             shrink: shown.shrink(before, seed),
-            explainable_fraction: remainder::explained(before.mean_square(), shown.mean_square(), before.floor()),
+            explainable_fraction: explained(before.mean_square(), shown.mean_square(), before.floor()),
             joint_rms_rad: self.joints,
             torque_rms: self.torque_rms,
             object_add_m: self.add,
