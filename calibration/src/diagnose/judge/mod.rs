@@ -33,6 +33,8 @@ pub(super) mod recorded_arm;
 pub mod remainder;
 pub mod score;
 pub(super) mod sizes;
+#[cfg(test)]
+mod test_trial;
 pub(super) mod tolerance;
 pub mod trial;
 pub(super) mod unproven;

@@ -150,7 +150,7 @@ fn is_beaten(by: &Gain, needed: &Gain) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::gap::Residuals;
-    use super::super::trial::tests::{step, trial};
+    use super::super::test_trial::{step, trial};
     use super::*;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth};

@@ -91,7 +91,7 @@ impl Partly {
 
 #[cfg(test)]
 mod tests {
-    use super::super::trial::tests::{step, trial};
+    use super::super::test_trial::{step, trial};
     use super::*;
     use crate::diagnose::fit::bench::Hypothesis;
     use crate::diagnose::library::Library;

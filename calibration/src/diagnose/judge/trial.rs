@@ -262,40 +262,13 @@ impl Step {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use super::super::test_trial::{step, trial};
     use super::*;
-    use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
+    use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
     use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
     use worlds::world::Kind;
-
-    /// Twelve clips that are likelier by so much together [nats].
-    pub(in super::super) fn likelier(nats: f64) -> Predicted {
-        Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() }
-    }
-
-    pub(in super::super) fn trial(library: &Library, candidate: usize, (fitted, nats): (&Hypothesis, f64)) -> Trial {
-        Trial {
-            scored: Scored { signal: 30.0, ..nothing_said_of(library, candidate) },
-            fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
-            closes: 0.9,
-            closes_of_gap: 0.9,
-            own_numbers: false,
-            beside_contact: BesideContact::default(),
-        }
-    }
-
-    pub(in super::super) fn step(from: &Hypothesis, trials: Vec<Trial>) -> Step {
-        Step {
-            from: from.clone(),
-            trials,
-            predicted: likelier(0.0),
-            weights: vec![1.0; 4 * MAX_JOINTS],
-            arm_rows: 100,
-            left: Vec::new(),
-            whole: Vec::new(),
-        }
-    }
 
     #[test]
     fn a_camera_that_is_off_by_little_is_a_cause_where_nearly_all_clips_speak_for_it_or_a_stage_shows_it() {

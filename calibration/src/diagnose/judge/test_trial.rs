@@ -1,0 +1,37 @@
+//! Trials and steps of a search that say what a test needs.
+
+use super::score::Predicted;
+use super::trial::{BesideContact, Step, Trial};
+use crate::diagnose::fit::bench::Hypothesis;
+use crate::diagnose::fit::shortlist::Scored;
+use crate::diagnose::library::Library;
+use crate::diagnose::test_bench::nothing_said_of;
+use shared_mem::msg::MAX_JOINTS;
+
+/// Twelve clips that are likelier by so much together [nats].
+pub(super) fn likelier(nats: f64) -> Predicted {
+    Predicted { clips: (0..12).map(|clip| (clip, 1000.0 - nats / 6.0)).collect() }
+}
+
+pub(super) fn trial(library: &Library, candidate: usize, (fitted, nats): (&Hypothesis, f64)) -> Trial {
+    Trial {
+        scored: Scored { signal: 30.0, ..nothing_said_of(library, candidate) },
+        fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
+        closes: 0.9,
+        closes_of_gap: 0.9,
+        own_numbers: false,
+        beside_contact: BesideContact::default(),
+    }
+}
+
+pub(super) fn step(from: &Hypothesis, trials: Vec<Trial>) -> Step {
+    Step {
+        from: from.clone(),
+        trials,
+        predicted: likelier(0.0),
+        weights: vec![1.0; 4 * MAX_JOINTS],
+        arm_rows: 100,
+        left: Vec::new(),
+        whole: Vec::new(),
+    }
+}
