@@ -12,6 +12,7 @@ use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::gain::Gain;
 use inference::admit::Split;
 use inference::likelihood::Evidence;
+use twin::effects::Stage;
 
 /// An effect on the arm must be worth more than this for each of its residuals [nats]: there are so many that the least numerics add up.
 pub(in crate::diagnose) const MIN_NATS_PER_ROW: f64 = 0.0025;
@@ -178,7 +179,10 @@ impl Step {
     /// Whether it is no chance that a trial gains this, and what it gains no numerics.
     fn convinces<E: Evidence>(&self, bench: &Bench<'_, E>, trial: &Trial, fit: &Hypothesis, gain: &Gain) -> bool {
         let (library, candidate) = (bench.library, trial.scored.candidate);
-        let (of_arm, much) = (library.is_of_arm(candidate), trial.closes_of_gap > LARGE_SHARE_CLOSED);
+        // How joints yield in contact, any two engines differ by: for what changes the hit it shows nothing.
+        let of_hit = library.candidates[candidate].effect.stage == Stage::Hit;
+        let closes = if of_hit { trial.closes_of_gap } else { trial.closes };
+        let (of_arm, much) = (library.is_of_arm(candidate), closes > LARGE_SHARE_CLOSED);
         // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing ...
         let shown = of_arm || self.object_gap() || (much && self.is_alone(library, candidate));
         // ... and beside a cause that was found before, a gain on nearly all of them neither.
