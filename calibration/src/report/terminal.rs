@@ -157,7 +157,7 @@ fn gap(diagnosis: &Diagnosis) -> Vec<String> {
         ("joints", "rad", gap.joint_rms_rad),
         ("torques", "N m", torques),
         ("ADD", "m", gap.object_add_m),
-        ("ADD of the clip in the middle", "m", gap.median.object_add_m),
+        ("median ADD", "m", gap.median.object_add_m),
         ("ADD-S", "m", gap.object_add_s_m),
     ];
     for (name, si, change) in human {

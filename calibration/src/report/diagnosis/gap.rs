@@ -37,7 +37,7 @@ pub(super) fn picture(diagnosis: &Diagnosis) -> Markup {
         ("joints, RMS", "rad", gap.joint_rms_rad),
         ("torques, RMS", "N m", torques),
         ("object, ADD", "m", gap.object_add_m),
-        ("object, ADD of the clip in the middle", "m", gap.median.object_add_m),
+        ("object, median ADD", "m", gap.median.object_add_m),
         ("object, ADD-S", "m", gap.object_add_s_m),
     ];
     for (name, unit, change) in human {
