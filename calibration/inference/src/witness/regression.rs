@@ -3,6 +3,7 @@
 
 use crate::statistics::robust_sigma;
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// Standard deviations from which on a row counts less (Huber's constant, rounded up).
 const HUBER: f64 = 2.0;
@@ -25,7 +26,7 @@ pub(super) struct Regression {
     pub(super) shared: f64,
     residuals: Vec<f64>,
     weights: Vec<f64>,
-    clips: Vec<usize>,
+    clips: usize,
 }
 
 /// Equations of a pass.
@@ -38,15 +39,13 @@ struct Equations {
 /// are known so well that they cost no degree of freedom. `least_shared`: the least error that rows of a clip share. `None` of samples
 /// that say nothing.
 pub(super) fn regress(samples: &[Sample], scale: &[f64], free: usize, least_shared: f64) -> Option<Regression> {
-    let mut clips: Vec<usize> = samples.iter().map(|sample| sample.clip).collect();
-    clips.dedup();
     let mut found = Regression {
         values: vec![0.0; scale.len()],
         errors: Vec::new(),
         shared: 0.0,
         residuals: samples.iter().map(|sample| sample.measured).collect(),
         weights: vec![1.0; samples.len()],
-        clips,
+        clips: rows(samples).count(),
     };
     let mut noise = robust_sigma(found.residuals.iter().copied())?.max(f64::MIN_POSITIVE);
     found.shared = least_shared;
@@ -65,6 +64,15 @@ pub(super) fn regress(samples: &[Sample], scale: &[f64], free: usize, least_shar
     Some(found)
 }
 
+/// Rows of each clip.
+fn rows(samples: &[Sample]) -> impl Iterator<Item = Range<usize>> {
+    samples.chunk_by(|a, b| a.clip == b.clip).scan(0, |end, of_clip| {
+        let begin = *end;
+        *end += of_clip.len();
+        Some(begin..*end)
+    })
+}
+
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -72,13 +80,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 impl Regression {
     /// How many clips it comes from.
     pub(super) fn clips(&self) -> usize {
-        self.clips.len()
-    }
-
-    /// Rows of each clip.
-    fn rows<'a>(&'a self, samples: &'a [Sample]) -> impl Iterator<Item = Vec<usize>> + 'a {
-        let of = move |clip: &'a usize| (0..samples.len()).filter(move |row| samples[*row].clip == *clip).collect();
-        self.clips.iter().map(of)
+        self.clips
     }
 
     /// Normal equations; the error that a clip's rows share is eliminated (Sherman & Morrison 1950).
@@ -86,7 +88,7 @@ impl Regression {
         let count = scale.len();
         let mut information = DMatrix::from_fn(count, count, |i, j| if i == j { scale[i].powi(-2) } else { 0.0 });
         let mut score = DVector::zeros(count);
-        for rows in self.rows(samples) {
+        for rows in rows(samples) {
             let (mut along, mut measured, mut sum) = (DVector::zeros(count), 0.0, 0.0);
             for row in rows {
                 let weight = self.weights[row] / noise.powi(2);
@@ -106,32 +108,32 @@ impl Regression {
 
     /// White noise of the rows, one sigma: what they scatter by within clips.
     fn white(&self, samples: &[Sample]) -> Option<f64> {
-        let within = self.rows(samples).flat_map(|rows| {
-            let middle = crate::statistics::median(rows.iter().map(|row| self.residuals[*row])).unwrap_or_default();
-            rows.into_iter().map(move |row| self.residuals[row] - middle).collect::<Vec<_>>()
+        let within = rows(samples).flat_map(|rows| {
+            let middle = crate::statistics::median(rows.clone().map(|row| self.residuals[row])).unwrap_or_default();
+            rows.map(move |row| self.residuals[row] - middle).collect::<Vec<_>>()
         });
         robust_sigma(within)
     }
 
     /// Variance of the error that the rows of a clip share.
     fn between(&self, samples: &[Sample], noise: f64, free: usize) -> f64 {
-        let beyond = self.rows(samples).map(|rows| {
+        let beyond = rows(samples).map(|rows| {
             let count = rows.len() as f64;
-            let mean = rows.iter().map(|row| self.residuals[*row]).sum::<f64>() / count;
+            let mean = rows.map(|row| self.residuals[row]).sum::<f64>() / count;
             mean.powi(2) - noise.powi(2) / count
         });
-        beyond.sum::<f64>() / self.clips.len().saturating_sub(free).max(1) as f64
+        beyond.sum::<f64>() / self.clips.saturating_sub(free).max(1) as f64
     }
 
     /// For each clip the mean of regressor `k`, and of what is left.
     pub(super) fn by_clip(&self, samples: &[Sample], k: usize) -> Vec<[f64; 2]> {
-        let mean = |rows: &[usize], of: &dyn Fn(usize) -> f64| {
-            let sum: f64 = rows.iter().map(|row| self.weights[*row]).sum();
-            rows.iter().map(|row| self.weights[*row] * of(*row)).sum::<f64>() / sum
+        let mean = |rows: Range<usize>, of: &dyn Fn(usize) -> f64| {
+            let sum: f64 = rows.clone().map(|row| self.weights[row]).sum();
+            rows.map(|row| self.weights[row] * of(row)).sum::<f64>() / sum
         };
-        let of = |rows: Vec<usize>| {
-            [mean(&rows, &|row| samples[row].regressors[k]), mean(&rows, &|row| self.residuals[row])]
+        let of = |rows: Range<usize>| {
+            [mean(rows.clone(), &|row| samples[row].regressors[k]), mean(rows, &|row| self.residuals[row])]
         };
-        self.rows(samples).map(of).collect()
+        rows(samples).map(of).collect()
     }
 }
