@@ -183,7 +183,7 @@ fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> Str
         let shrinks = if finding.confirmed {
             format!("shrinks it {} and leaves more than a cause does", facts.shrink.in_words())
         } else {
-            "does not predict clips better that it was not fitted to".to_owned()
+            "does not predict held-out clips better".to_owned()
         };
         format!("; {} comes nearest{strength} but {shrinks}", facts.effects.join(" with "))
     };

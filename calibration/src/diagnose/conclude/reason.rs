@@ -121,7 +121,7 @@ fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>
 fn nearest(judged: &Judged<'_>) -> String {
     let finding = judged.finding;
     if !finding.confirmed {
-        return "does not predict clips better that it was not fitted to".into();
+        return "does not predict held-out clips better".into();
     }
     if judged.kind == Kind::None
         || finding.left.iter().all(|left| !left.too_much(finding.clear)) && !finding.implausible

@@ -11,7 +11,7 @@ use crate::answer::diagnosis::{Clips, Diagnosis, Gap, Kind, Nearest, NextMotion,
 use crate::diagnose::criteria::CLASS_IS_RIGHT;
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::gap::Residuals;
-use crate::diagnose::judge::held_out::Measured;
+use crate::diagnose::judge::held_out::estimated;
 use crate::diagnose::judge::localise::localise;
 use crate::diagnose::judge::partly::Partly;
 use crate::diagnose::judge::sizes::Sizes;
@@ -137,8 +137,8 @@ fn not_proven<'a, E: Evidence>(
     before: &Residuals,
 ) -> Option<(Unproven<'a>, f64)> {
     let open = unproven(case.bench, decided.found(case), case.admitted.cut())?;
-    let with = Measured::of(case.bench, case.split, open.fit, &case.first().weights).ok()?;
-    let share = with.held_out.left.shrink(before, case.options.seed).value;
+    // As of every candidate that is not named.
+    let share = estimated(case.bench, case.split, open.fit)?.shrink(before, case.options.seed).value;
     (share > 0.0).then_some((open, share))
 }
 
