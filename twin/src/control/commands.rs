@@ -10,6 +10,9 @@ use shared_mem::time::TICK_NS;
 /// A log at most this far apart is the control loop's own: a missing row was lost on its way to the log, not to the
 /// robot [ns].
 const CONTROL_RATE_NS: u64 = 1_500_000;
+/// Between rows of a slow log that are further apart nothing is filled in [ns] (a choice: within a second a command goes anywhere): where
+/// stamps lie by hours, what is filled in would not fit into the memory.
+const LONGEST_FILLED_NS: u64 = 1_000_000_000;
 /// Rows further away than so many steps between two others say nothing of what lies between those [1]: a choice.
 const FAR_ROWS: f64 = 3.0;
 /// So many usual steps without a command are a hole: what the robot was commanded in there cannot be guessed.
@@ -67,7 +70,8 @@ impl CommandTrack {
 
     /// Whether a log of commands leaves open what a controller at 1 kHz was given between its rows.
     pub fn is_open_between(desired: &JointSeries) -> bool {
-        is_slow(&desired.stamps_ns)
+        usual_step_ns(&desired.stamps_ns)
+            .is_some_and(|usual| (CONTROL_RATE_NS + 1..=LONGEST_FILLED_NS).contains(&usual))
     }
 
     /// Stretches too long to fill or to hold through.
@@ -84,7 +88,7 @@ impl CommandTrack {
             let Some(&next_ns) = self.stamps_ns.get(row + 1) else { break };
             let from_ns = self.stamps_ns[row];
             let step = next_ns - from_ns;
-            if step > HOLE_STEPS * usual {
+            if step > HOLE_STEPS * usual || slow && goes_on(between) && step > LONGEST_FILLED_NS {
                 out.holes.push(Hole { from_ns, to_ns: next_ns });
             } else if !slow || goes_on(between) {
                 let apart = if slow { TICK_NS } else { usual };
@@ -245,6 +249,11 @@ mod tests {
         let bare = CommandTrack::going_on(&JointSeries { dq: Vec::new(), ..desired.clone() }, BetweenCommands::Line);
         let bare = bare.expect("rows");
         assert!((bare.dq_d(6)[0] - 1e3 * (cube(8.0) - cube(4.0)) / 4.0).abs() < 1e-6);
+        // Stamps that are hours apart are no log of a control loop: nothing is filled in.
+        let hours = JointSeries { stamps_ns: ms.iter().map(|ms| ms * 3_600_000_000_000).collect(), ..desired.clone() };
+        let track = CommandTrack::going_on(&hours, BetweenCommands::Line).expect("rows");
+        assert_eq!((track.stamps_ns.len(), track.holes().len()), (5, 4));
+        assert!(CommandTrack::is_open_between(&desired) && !CommandTrack::is_open_between(&hours));
         // A log of the control loop itself leaves nothing open.
         let fast = JointSeries { stamps_ns: desired.stamps_ns.iter().map(|ns| ns / 4).collect(), ..desired };
         assert_eq!(CommandTrack::going_on(&fast, BetweenCommands::Smooth), CommandTrack::new(&fast));
