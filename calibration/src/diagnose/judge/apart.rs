@@ -89,7 +89,7 @@ fn sentence(effect: &str, common: f64, own: &[Own]) -> Option<String> {
     };
     let each: Vec<String> = own.iter().map(one).collect();
     Some(format!(
-        "{} of {} for all joints fits not each of them: {}; the joints have drives or filters of their own, and what stays is theirs",
+        "{} of {} for all joints does not fit each of them: {}; their drives or filters differ, and one number cannot follow that",
         words(effect),
         unit.with_unit(common),
         each.join(", ")

@@ -20,7 +20,8 @@ pub(super) fn section(witnesses: &[Witness]) -> Markup {
                 div.pair { @for witness in shown { figure { (picture(witness)) } } }
                 table {
                     tr {
-                        th { "stage" } th { "effect" } th { "number" } th.n { "standard errors from zero" } th.n { "clips" } th { "or" }
+                        th { "stage" } th { "effect" } th { "number" }
+                        th.n { "standard errors from zero" } th.n { "clips" } th { "would look alike" }
                     }
                     @for witness in witnesses {
                         tr {
