@@ -31,11 +31,7 @@ pub(super) fn found(
     let Some(step_ns) = some.first().filter(|_| open).and_then(|clip| usual_step_ns(&clip.desired.stamps_ns)) else {
         return Ok(None);
     };
-    let mut left: Vec<(BetweenCommands, f64)> = Vec::new();
-    for way in WAYS {
-        let rest = law::left_under(&going(cell, way), &some, given, interrupt)?;
-        left.extend(rest.map(|rest| (way, rest)));
-    }
+    let left = law::left_in_each(WAYS, |way| going(cell, way), &some, given, interrupt)?;
     let best = left.iter().copied().min_by(|(_, a), (_, b)| a.total_cmp(b));
     Ok(best.map(|(way, _)| (going(cell, way), sentence(way, step_ns, &left))))
 }

@@ -34,11 +34,7 @@ pub(super) fn found(
         return Ok(None);
     }
     let some: Vec<Clip> = moving().take(CLIPS_THAT_DECIDE).cloned().collect();
-    let mut left: Vec<(ControllerKind, f64)> = Vec::new();
-    for kind in LAWS {
-        let rest = left_under(&under(cell, kind), &some, given, interrupt)?;
-        left.extend(rest.map(|rest| (kind, rest)));
-    }
+    let left = left_in_each(LAWS, |kind| under(cell, kind), &some, given, interrupt)?;
     let least = left.iter().map(|(_, rest)| *rest).fold(f64::INFINITY, f64::min);
     // The first in the order of [`LAWS`], not the best: gains make up for what tells laws apart.
     let best = left.iter().find(|(_, rest)| *rest < FITS_AS_WELL_WITHIN * least);
@@ -53,8 +49,20 @@ fn under(cell: &Cell, kind: ControllerKind) -> Cell {
     cell
 }
 
+/// What the best gains leave in each of several ways in which the arm may be led, those left out in which it cannot follow.
+pub(super) fn left_in_each<W: Copy>(
+    ways: impl IntoIterator<Item = W>,
+    led: impl Fn(W) -> Cell,
+    clips: &[Clip],
+    given: Option<&Theta>,
+    interrupt: &Interrupt,
+) -> Result<Vec<(W, f64)>, ControllerError> {
+    let left = |way| Ok(left_under(&led(way), clips, given, interrupt)?.map(|rest| (way, rest)));
+    ways.into_iter().filter_map(|way| left(way).transpose()).collect()
+}
+
 /// Root mean square of what the best gains leave, over the encoders' noise; `None` where the arm cannot follow under this law.
-pub(super) fn left_under(
+fn left_under(
     cell: &Cell,
     clips: &[Clip],
     given: Option<&Theta>,
