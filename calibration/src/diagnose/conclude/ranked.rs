@@ -168,7 +168,6 @@ mod tests {
     use crate::diagnose::fit::bench::Hypothesis;
     use crate::diagnose::fit::shortlist::Scored;
     use crate::diagnose::judge::score::Predicted;
-    use crate::diagnose::judge::trial::BesideContact;
 
     fn hypothesis(effects: &[usize]) -> Hypothesis {
         Hypothesis { effects: effects.to_vec(), full: Vec::new(), free: Vec::new(), fitted: Vec::new() }
@@ -177,24 +176,21 @@ mod tests {
     /// A step from these effects on, with candidates that were fitted in it or only looked at.
     fn step(from: &[usize], candidates: &[(usize, bool)]) -> Step {
         let predicted = Predicted { clips: vec![(0, 1000.0), (1, 1000.0)] };
+        let scored = |candidate: usize| Scored {
+            candidate,
+            alternative: 0,
+            units: vec![0.0],
+            next: Vec::new(),
+            gain: 0.0,
+            cost: 1,
+            cosine: 0.5,
+            signal: 30.0,
+            imitated: 0.1,
+            p: 0.0,
+        };
         let trial = |(candidate, fitted): &(usize, bool)| Trial {
-            scored: Scored {
-                candidate: *candidate,
-                alternative: 0,
-                units: vec![0.0],
-                next: Vec::new(),
-                gain: 0.0,
-                cost: 1,
-                cosine: 0.5,
-                signal: 30.0,
-                imitated: 0.1,
-                p: 0.0,
-            },
             fitted: fitted.then(|| (hypothesis(&[from, &[*candidate]].concat()), predicted.over(&predicted))),
-            closes: 0.0,
-            closes_of_gap: 0.0,
-            own_numbers: true,
-            beside_contact: BesideContact::default(),
+            ..Trial::untried(scored(*candidate), true)
         };
         Step {
             from: hypothesis(from),

@@ -71,7 +71,7 @@ fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>
     if advantage.nats <= 0.0 {
         return format!("does not predict held-out clips better: log-likelihood changes by {gain}");
     }
-    let plain = trial.closes > LARGE_SHARE_CLOSED && advantage.in_nearly_all();
+    let plain = trial.closed.most > LARGE_SHARE_CLOSED && advantage.in_nearly_all();
     if !EFFECTS.proves(advantage, cost) && !plain {
         let share = 100.0 * advantage.share;
         return format!(
@@ -203,8 +203,9 @@ mod tests {
     use super::*;
     use crate::diagnose::fit::bench::Hypothesis;
     use crate::diagnose::fit::shortlist::Scored;
+    use crate::diagnose::judge::closing::Closed;
     use crate::diagnose::judge::score::Predicted;
-    use crate::diagnose::judge::trial::{BesideContact, Step};
+    use crate::diagnose::judge::trial::Step;
     use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped};
     use worlds::world::{Fault, World};
 
@@ -226,12 +227,12 @@ mod tests {
             let of_arm = (0..bench.library.candidates.len()).filter(|k| bench.library.candidates[*k].is_of_arm());
             let [leading, other] = of_arm.take(2).collect::<Vec<_>>()[..] else { panic!("two effects on the arm") };
             let trial = |candidate, nats: Option<f64>, closes, p, gain| Trial {
-                scored: Scored { cosine: 0.3, gain, p, signal: 30.0, ..nothing_said_of(bench.library, candidate) },
                 fitted: nats.map(|nats| (hypothesis(&[candidate], &start), likelier(nats).over(&likelier(0.0)))),
-                closes,
-                closes_of_gap: closes,
-                own_numbers: false,
-                beside_contact: BesideContact::default(),
+                closed: Closed::all(closes),
+                ..Trial::untried(
+                    Scored { cosine: 0.3, gain, p, signal: 30.0, ..nothing_said_of(bench.library, candidate) },
+                    false,
+                )
             };
             let found = |candidate: Trial| {
                 let step = |from: &[usize], trials: Vec<Trial>| Step {

@@ -23,6 +23,14 @@ pub struct Closed {
     pub of_gap: f64,
 }
 
+#[cfg(test)]
+impl Closed {
+    /// The same with and without the joints in contact.
+    pub fn all(share: f64) -> Self {
+        Self { most: share, of_gap: share }
+    }
+}
+
 /// What closes; `whole`: what the baseline leaves.
 pub fn closes<E: Evidence>(
     bench: &Bench<'_, E>,

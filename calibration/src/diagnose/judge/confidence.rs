@@ -39,7 +39,7 @@ pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64
         let enough = match dearer {
             true => trial.closes_more_than(chosen_trial),
             false if library.look_alike(candidate, chosen) => trial.is_cause(),
-            false => trial.closes > MOST_OF_IT * chosen_trial.closes,
+            false => trial.closed.most > MOST_OF_IT * chosen_trial.closed.most,
         };
         alike && enough && step.comes_as_near(trial, chosen_trial)
     };
@@ -48,8 +48,8 @@ pub fn rivals(step: &Step, library: &Library, chosen: usize, overdispersion: f64
 
 #[cfg(test)]
 mod tests {
+    use super::super::closing::Closed;
     use super::super::score::Predicted;
-    use super::super::trial::BesideContact;
     use super::*;
 
     use crate::diagnose::fit::bench::{FittedClip, Hypothesis};
@@ -80,14 +80,8 @@ mod tests {
             p: 0.0,
         };
         let fit = Hypothesis { effects: vec![candidate], full: Vec::new(), free: Vec::new(), fitted: Vec::new() };
-        Trial {
-            scored,
-            fitted: Some((fit, predicted(nats).over(&predicted(0.0)))),
-            closes,
-            closes_of_gap: closes,
-            own_numbers: true,
-            beside_contact: BesideContact::default(),
-        }
+        let fitted = Some((fit, predicted(nats).over(&predicted(0.0))));
+        Trial { fitted, closed: Closed::all(closes), ..Trial::untried(scored, true) }
     }
 
     #[test]
@@ -106,7 +100,7 @@ mod tests {
             "one with more numbers does not"
         );
         // ... unless it closes markedly more, where nuisance parameters of clips could hide that from the likelihood.
-        dearer.closes = 0.5;
+        dearer.closed = Closed::all(0.5);
         assert!(sure(&[cause.clone(), dearer.clone()]) < 0.6, "one that closes markedly more does");
         dearer.own_numbers = false;
         assert!((sure(&[cause, dearer]) - MAX_PROBABILITY).abs() < 1e-6);

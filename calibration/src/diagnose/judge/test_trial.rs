@@ -1,7 +1,8 @@
 //! Trials and steps of a search that say what a test needs.
 
+use super::closing::Closed;
 use super::score::Predicted;
-use super::trial::{BesideContact, Step, Trial};
+use super::trial::{Step, Trial};
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Library;
@@ -15,12 +16,9 @@ pub(super) fn likelier(nats: f64) -> Predicted {
 
 pub(super) fn trial(library: &Library, candidate: usize, (fitted, nats): (&Hypothesis, f64)) -> Trial {
     Trial {
-        scored: Scored { signal: 30.0, ..nothing_said_of(library, candidate) },
         fitted: Some((fitted.clone(), likelier(nats).over(&likelier(0.0)))),
-        closes: 0.9,
-        closes_of_gap: 0.9,
-        own_numbers: false,
-        beside_contact: BesideContact::default(),
+        closed: Closed::all(0.9),
+        ..Trial::untried(Scored { signal: 30.0, ..nothing_said_of(library, candidate) }, false)
     }
 }
 

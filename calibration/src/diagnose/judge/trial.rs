@@ -1,6 +1,6 @@
 //! Candidates tried on top of a hypothesis, and what makes one of them a cause.
 
-use super::closing::{MIN_SHARE_CLOSED, closes};
+use super::closing::{Closed, MIN_SHARE_CLOSED, closes};
 use super::gap::{Residuals, Typical};
 use super::score::{Predicted, predict};
 use crate::diagnose::criteria::{MOST_OF_IT, OBJECT_EXCESS};
@@ -33,10 +33,8 @@ pub struct Trial {
     pub scored: Scored,
     /// Fitted, where that was worth it.
     pub fitted: Option<(Hypothesis, Gain)>,
-    /// [`closes`]: how much of the gap, the joints in contact among it.
-    pub closes: f64,
-    /// The same without these.
-    pub closes_of_gap: f64,
+    /// How much of the gap closes with it.
+    pub closed: Closed,
     /// Whether clips have nuisance parameters.
     pub own_numbers: bool,
     /// What shows it apart from the gap that contact leaves.
@@ -54,9 +52,15 @@ pub struct BesideContact {
 }
 
 impl Trial {
+    /// One that has not been fitted.
+    pub fn untried(scored: Scored, own_numbers: bool) -> Self {
+        let (closed, beside_contact) = (Closed::default(), BesideContact::default());
+        Self { scored, fitted: None, closed, own_numbers, beside_contact }
+    }
+
     /// Whether enough of the gap closes with it for a cause, however much better the clips are predicted, or it shows beside that.
     pub fn is_cause(&self) -> bool {
-        self.closes > MIN_SHARE_CLOSED || self.shows_beside_contact()
+        self.closed.most > MIN_SHARE_CLOSED || self.shows_beside_contact()
     }
 
     /// Whether it shows apart from the gap that contact leaves: a single stage shows it, or it is of the camera and nearly all clips
@@ -88,7 +92,7 @@ impl Trial {
     /// Whether it closes so much more of the gap that its additional numbers are worth it although clips are predicted as well
     /// without them.
     pub fn closes_more_than(&self, other: &Self) -> bool {
-        self.own_numbers && self.closes > other.closes + CLOSED_BY_MORE_PARAMETERS
+        self.own_numbers && self.closed.most > other.closed.most + CLOSED_BY_MORE_PARAMETERS
     }
 }
 
@@ -181,7 +185,7 @@ impl Step {
         let (library, candidate) = (bench.library, trial.scored.candidate);
         // How joints yield in contact, any two engines differ by: for what changes the hit it shows nothing.
         let of_hit = library.candidates[candidate].effect.stage == Stage::Hit;
-        let closes = if of_hit { trial.closes_of_gap } else { trial.closes };
+        let closes = if of_hit { trial.closed.of_gap } else { trial.closed.most };
         let (of_arm, much) = (library.is_of_arm(candidate), closes > LARGE_SHARE_CLOSED);
         // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing ...
         let shown = of_arm || self.object_gap() || (much && self.is_alone(library, candidate));
@@ -218,7 +222,7 @@ impl Step {
                     closed.most
                 );
                 let trial = &mut self.trials[place];
-                (trial.closes, trial.closes_of_gap) = (closed.most, closed.of_gap);
+                trial.closed = closed;
                 trial.fitted = Some((fit, gain));
             }
         }
@@ -284,7 +288,7 @@ mod tests {
                 clips: (0..12).map(|clip| (clip, 1000.0 - 2.0 * nats(clip))).collect(),
             };
             let gain = predicted(nats).over(&predicted(&|_| 0.0));
-            let little = Trial { closes: 0.05, closes_of_gap: 0.05, beside_contact, ..trial(&library, 0, (&fit, 0.0)) };
+            let little = Trial { closed: Closed::all(0.05), beside_contact, ..trial(&library, 0, (&fit, 0.0)) };
             Trial { fitted: Some((fit.clone(), gain)), ..little }.is_cause()
         };
         let (in_all, in_most) = (|clip| 20.0 + (clip % 4) as f64, |clip| if clip % 4 == 0 { -9.0 } else { 20.0 });

@@ -33,7 +33,7 @@ pub(in crate::diagnose) fn unproven<'a, E: Evidence>(
     let step = found.steps.first().filter(|_| found.last.effects.is_empty())?;
     let one = |trial: &'a Trial| {
         let (fit, gain) = trial.fitted.as_ref()?;
-        let open = trial.closes > LARGE_SHARE_CLOSED && !EFFECTS.proves(gain, trial.scored.cost);
+        let open = trial.closed.most > LARGE_SHARE_CLOSED && !EFFECTS.proves(gain, trial.scored.cost);
         let more = gain.clips_more().filter(|_| open)?;
         let real =
             !bench.negligible(trial.scored.candidate, &fit.full) && !bench.is_convention(trial.scored.candidate, fit);

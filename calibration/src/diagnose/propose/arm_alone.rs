@@ -150,7 +150,7 @@ mod tests {
     use crate::diagnose::fit::sweep::Precision;
     use crate::diagnose::judge::gap::Typical;
     use crate::diagnose::judge::score::Predicted;
-    use crate::diagnose::judge::trial::{BesideContact, Trial};
+    use crate::diagnose::judge::trial::Trial;
     use crate::diagnose::library::Library;
     use crate::diagnose::test_bench::{nothing_said_of, on_strokes, shipped, with_effect};
     use inference::admit::Split;
@@ -169,14 +169,7 @@ mod tests {
 
     /// A step from these numbers on two strokes, in which trials of these candidates are to be fitted.
     fn step<E: Evidence>(bench: &Bench<'_, E>, full: Vec<f64>, even: &[f64], asked: &[usize]) -> (Step, Split) {
-        let trial = |candidate: &usize| Trial {
-            scored: nothing_said_of(bench.library, *candidate),
-            fitted: None,
-            closes: 0.0,
-            closes_of_gap: 0.0,
-            own_numbers: true,
-            beside_contact: BesideContact::default(),
-        };
+        let trial = |candidate: &usize| Trial::untried(nothing_said_of(bench.library, *candidate), true);
         let step = Step {
             from: bench.fit(&[], full, &[0, 1], even, None, PROBE).expect("a fit"),
             predicted: Predicted { clips: Vec::new() },

@@ -39,7 +39,7 @@ pub(super) fn reconsidered<E: Evidence>(search: &Search<'_, E>, step: Step) -> S
     if step.best(bench).is_some() || bench.scatter.count() == 0 {
         return step;
     }
-    let much = |trial: &Trial| trial.nats() > EFFECTS.min_gain_nats && trial.closes > LARGE_SHARE_CLOSED;
+    let much = |trial: &Trial| trial.nats() > EFFECTS.min_gain_nats && trial.closed.most > LARGE_SHARE_CLOSED;
     with_object_anew(search, step, |_, trial| much(trial) && !bench.library.is_of_arm(trial.scored.candidate))
 }
 

@@ -149,7 +149,7 @@ fn tried<E: Evidence>(search: &Search<'_, E>, from: &Hypothesis, first: Option<&
     let trial = |scored: Scored| {
         let of_camera = own_numbers && bench.library.candidates[scored.candidate].effect.stage == Stage::Camera;
         let beside_contact = BesideContact { of_camera, in_a_stage: false };
-        Trial { scored, fitted: None, closes: 0.0, closes_of_gap: 0.0, own_numbers, beside_contact }
+        Trial { beside_contact, ..Trial::untried(scored, own_numbers) }
     };
     let trials = scored.into_iter().map(trial).collect();
     let step = in_stages::compared(search, fitted(search, Step { trials, ..step }, &promising, false), &shown);
