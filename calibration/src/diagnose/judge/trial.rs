@@ -234,6 +234,12 @@ impl Step {
         self.left.iter().any(|group| group.of_object && group.mean_square - group.floor > OBJECT_EXCESS.value)
     }
 
+    /// Candidates with which clips are predicted worse, by more than the standard error of that.
+    pub(in crate::diagnose) fn worse_by_more_than_chance(&self) -> Vec<usize> {
+        let worse = |trial: &&Trial| trial.gain().is_some_and(|gain| gain.nats < -gain.error);
+        self.trials.iter().filter(worse).map(|trial| trial.scored.candidate).collect()
+    }
+
     /// The trial of a candidate.
     pub fn trial(&self, candidate: usize) -> Option<&Trial> {
         self.trials.iter().find(|trial| trial.scored.candidate == candidate)

@@ -15,7 +15,7 @@ pub mod signatures;
 pub mod starts;
 
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
-use crate::diagnose::fit::effort::Effort;
+use crate::diagnose::fit::effort::{Effort, REFINEMENT};
 use crate::diagnose::fit::multi_start::{MultiStart, Tried};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
@@ -57,7 +57,17 @@ impl<'a, E> Search<'a, E> {
         self.bench.fit(&fit.effects, fit.full.clone(), &self.split.train, weights, Some(fit), effort)
     }
 
-    /// The same on another bench of the same clips.
+    /// The effort of what is extended and what is found. Where a search leaves clips out, that is fitted to all of them once more, and
+    /// exactly ([`Bench::last_pass`]).
+    pub(in crate::diagnose) fn last_pass(&self) -> Effort
+    where
+        E: Evidence,
+    {
+        let exactly = self.bench.last_pass();
+        if self.split.is_of_few() { exactly } else { Effort { frees_held: exactly.frees_held, ..REFINEMENT } }
+    }
+
+    /// This search on another bench of the same clips.
     pub(in crate::diagnose) fn on<F>(&self, bench: &'a Bench<'a, F>) -> Search<'a, F> {
         Search { bench, split: self.split, refined: self.refined, witnessed: self.witnessed, bar: self.bar }
     }

@@ -11,7 +11,7 @@ use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::criteria::{JOINTS_EXCESS_BESIDE_A_CAUSE, OBJECT_EXCESS};
 use crate::diagnose::fit::anchored::Anchored;
 use crate::diagnose::fit::bench::Hypothesis;
-use crate::diagnose::fit::effort::{NEAR_DEVIANCE, REFINEMENT, SCREENING};
+use crate::diagnose::fit::effort::{NEAR_DEVIANCE, PROBE, REFINEMENT, SCREENING};
 use crate::diagnose::fit::shortlist::{MAX_FORMS, Scored};
 use crate::diagnose::fit::{floor, stages, undetermined};
 use crate::diagnose::judge::gap::Residuals;
@@ -57,6 +57,7 @@ impl<E: Evidence> Selection for Search<'_, E> {
         let first = before.first().map(|tried| &tried.step);
         let before_that: usize = before.iter().map(|tried| tried.restarts).sum();
         let mut from = now.clone();
+        let mut worse: Vec<usize> = Vec::new();
         for restarts in 0.. {
             let ended = |step| (Attempt { step, restarts }, None);
             let around = Anchored::new(self.bench.evidence, &from.full);
@@ -65,7 +66,7 @@ impl<E: Evidence> Selection for Search<'_, E> {
             if first.is_some_and(|first| is_spent(near, first, &from)) {
                 return untried(near, &from, first).map(ended);
             }
-            let Some(step) = tried(near, &from, first) else {
+            let Some(step) = tried(near, &from, (first, &worse)) else {
                 // Cut short by its budget: what was found before stands.
                 let stands = if self.bench.interrupt.spent() { untried(near, &from, first) } else { None };
                 return stands.map(ended);
@@ -78,6 +79,7 @@ impl<E: Evidence> Selection for Search<'_, E> {
                 return Some((Attempt { step, restarts }, extended));
             };
             self.bar.insert(&stages::further());
+            worse = step.worse_by_more_than_chance();
             from = by_engine(self, better, &step.weights);
         }
         None
@@ -127,8 +129,13 @@ fn is_spent<E: Evidence>(search: &Search<'_, E>, first: &Step, now: &Hypothesis)
     }) && in_stages::shown(search, &now.full).is_empty()
 }
 
-/// Sweeps around a hypothesis, scores all candidates, fits the best. `first`: the first step, where this is not the first.
-fn tried<E: Evidence>(search: &Search<'_, E>, from: &Hypothesis, first: Option<&Step>) -> Option<Step> {
+/// Sweeps around a hypothesis, scores all candidates, fits the best. `first`: the first step, where this is not the first; `worse`:
+/// candidates with which clips were predicted worse around a hypothesis that fitted less well than this one.
+fn tried<E: Evidence>(
+    search: &Search<'_, E>,
+    from: &Hypothesis,
+    (first, worse): (Option<&Step>, &[usize]),
+) -> Option<Step> {
     let bench = search.bench;
     let (weights, mut scored, narrow) = signatures::around(bench, search.split, from, search.bar)?;
     let step = begun(search, from, weights, first)?;
@@ -140,6 +147,7 @@ fn tried<E: Evidence>(search: &Search<'_, E>, from: &Hypothesis, first: Option<&
             scored.iter_mut().filter(|s| s.candidate == seen.candidate).for_each(|s| *s = seen.clone());
         }
     }
+    promising.retain(|candidate| !worse.contains(candidate));
     let own_numbers = bench.scatter.count() > 0;
     // What a stage shows by itself is fitted whatever slopes of roll-outs say.
     let shown = in_stages::shown(search, &step.from.full);
@@ -156,7 +164,7 @@ fn tried<E: Evidence>(search: &Search<'_, E>, from: &Hypothesis, first: Option<&
     if step.best(bench).is_some() {
         return Some(step);
     }
-    let rest = overlooked(bench, &step);
+    let rest: Vec<usize> = overlooked(bench, &step).into_iter().filter(|rest| !worse.contains(rest)).collect();
     search.bar.insert(&stages::planned(&[stages::FITS, stages::LAST_FITS]));
     Some(fitted(search, step, &rest, true))
 }
@@ -175,7 +183,7 @@ fn begun<E: Evidence>(
     first: Option<&Step>,
 ) -> Option<Step> {
     let (bench, split) = (search.bench, search.split);
-    let effort = if from.effects.is_empty() { REFINEMENT } else { bench.last_pass() };
+    let effort = if from.effects.is_empty() { REFINEMENT } else { search.last_pass() };
     let from = search.onwards(from, &weights, effort)?;
     let predicted = predict(bench, &from, &split.choose, &weights)?;
     let left = Residuals::at(bench, &from, &split.searched()).map(|left| left.typical()).unwrap_or_default();
@@ -229,6 +237,11 @@ fn a_little<E: Evidence>(search: &Search<'_, E>, step: &Step, place: usize, over
     if !starts::has_places(&bench.library.candidates[scored.candidate]) {
         return fits.best(starts, effort);
     }
-    // What lies in the right place may come down later than what stands in for it elsewhere.
-    fits.best_further(starts, effort, MAX_FORMS, bench.trying(scored.candidate, REFINEMENT))
+    // What lies in the right place may come down later than what stands in for it elsewhere: one look at all, and several to the end.
+    fits.best_further(
+        starts,
+        bench.trying(scored.candidate, PROBE),
+        MAX_FORMS,
+        bench.trying(scored.candidate, REFINEMENT),
+    )
 }

@@ -20,8 +20,8 @@ pub(super) fn refitted<E: Evidence>(search: &Search<'_, E>, fit: &Hypothesis, we
     let (bench, fits) = (search.bench, search.fits(&fit.effects, weights, fit));
     let ways = [Some(fit.full.clone()), other_way(bench, fit)];
     let anew = ways.iter().flatten().filter_map(|full| (search.refined)(full));
-    let best = fits.best(anew.chain([fit.full.clone()]), bench.last_pass())?;
-    let scanned = scanned(bench, &best, weights).and_then(|full| fits.fit(full, bench.last_pass()));
+    let best = fits.best(anew.chain([fit.full.clone()]), search.last_pass())?;
+    let scanned = scanned(bench, &best, weights).and_then(|full| fits.fit(full, search.last_pass()));
     cheapest([Some(best), scanned].into_iter().flatten())
 }
 
