@@ -208,6 +208,8 @@ pub struct Gap {
     pub median: Medians,
     /// The gap of each kind of sensor by itself.
     pub sensors: Vec<SensorGap>,
+    /// That of the arm, joint by joint.
+    pub joints: Vec<JointGap>,
 }
 
 /// Medians over clips: a hit on a corner decides none of them.
@@ -231,6 +233,19 @@ pub struct SensorGap {
     /// With all effects that the search found, named or not.
     pub after: f64,
     /// What noise and scatter alone leave.
+    pub floor: f64,
+}
+
+/// The arm's gap in one joint, as [`SensorGap`] has it of all.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct JointGap {
+    /// From 1, as a laboratory counts.
+    pub joint: usize,
+    /// With the paper's parameters identified.
+    pub before: f64,
+    /// With all effects that the search found, named or not.
+    pub after: f64,
+    /// What noise alone leaves.
     pub floor: f64,
 }
 

@@ -39,7 +39,7 @@ mod test_likelihood;
 mod work;
 
 pub use crate::answer::diagnosis::{
-    Basis, Candidate, Change, Clips, Diagnosis, Gap, Kind, Medians, Nearest, NextMotion, Place, Remedy, Rest,
+    Basis, Candidate, Change, Clips, Diagnosis, Gap, JointGap, Kind, Medians, Nearest, NextMotion, Place, Remedy, Rest,
     SensorGap, Sensors, Share, StageTest, Status, TorqueRms, Verdict,
 };
 

@@ -19,6 +19,7 @@ use crate::diagnose::judge::ends;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out::HeldOut;
 use crate::diagnose::judge::localise;
+use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes::Sizes;
 use crate::diagnose::select::gain::SAME_WORTH_NATS;
 use crate::diagnose::work::{DiagnoseError, Options};
@@ -69,7 +70,7 @@ pub(super) fn conclude<E: Evidence>(
     let shown = if believed { &with } else { &under_a };
     let gap = Sizes::of(pair_bench.bench, [&under_a, shown], session, &case.pair.admitted)?.gap(
         [before, &shown.left],
-        SensorGap::of_groups(&before.typical(), &shown.left.typical()),
+        Left::of(pair_bench.bench, before, &shown.left),
         options.seed,
     );
     let (gap_of_a, places) = (of_a(pair_bench, case), localise::localise(pair_bench.bench.evidence, before));

@@ -76,7 +76,7 @@ fn finding<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Finding<
         confidence: sureness(found),
         clear,
         of_arm: found.last.effects.iter().all(|effect| bench.library.candidates[*effect].is_of_arm()),
-        left: measures.left.clone(),
+        left: measures.left.sensors.clone(),
         confirmed: measures.confirmation.holds || measures.confirmation.better && found.shows_beside_contact(),
         implausible: !remainder::implausible(bench, &measures.with.of_all).is_empty(),
         within_tolerance: measures.within_tolerance,

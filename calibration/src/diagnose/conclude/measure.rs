@@ -1,11 +1,12 @@
 //! What clips say of the baseline and of what the search found, by numbers that were fitted to others.
 
 use super::Case;
-use crate::answer::diagnosis::{Place, SensorGap};
+use crate::answer::diagnosis::Place;
 use crate::diagnose::judge::confirm::{Confirmation, confirm};
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out::Measured;
 use crate::diagnose::judge::localise::localise;
+use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes;
 use crate::diagnose::work::DiagnoseError;
 use inference::likelihood::Evidence;
@@ -18,8 +19,8 @@ pub(super) struct Measures {
     pub(super) with: Measured,
     /// Where the baseline leaves most.
     pub(super) places: Vec<Place>,
-    /// The gap before and after, of every group of sensors, in a clip like most.
-    pub(super) left: Vec<SensorGap>,
+    /// What the baseline and all that was found leave.
+    pub(super) left: Left,
     pub(super) confirmation: Confirmation,
     /// Of every step of the search.
     pub(super) overdispersion: Vec<f64>,
@@ -35,14 +36,12 @@ pub(super) fn measure<E: Evidence>(case: &Case<'_, E>) -> Result<Measures, Diagn
     let nothing_found = found.last.full == case.first().from.full;
     let with =
         if nothing_found { without.clone() } else { Measured::of(bench, split, &found.last, case.last_weights())? };
-    let typical = |measured: &Measured| {
-        let left = Residuals::at(bench, &measured.of_all, &split.confirm).ok_or(DiagnoseError::NoBaseline)?;
-        Ok::<_, DiagnoseError>(left.typical())
-    };
-    let [before, after] = [typical(&without)?, typical(&with)?];
+    let left =
+        |measured: &Measured| Residuals::at(bench, &measured.of_all, &split.confirm).ok_or(DiagnoseError::NoBaseline);
+    let (before, after) = (left(&without)?, left(&with)?);
     let both = [&without.held_out, &with.held_out];
     Ok(Measures {
-        left: SensorGap::of_groups(&before, &after),
+        left: Left::of(bench, &before, &after),
         confirmation: confirm(bench, weights, both, options.seed)?,
         overdispersion: found.overdispersion(bench),
         within_tolerance: sizes::within_tolerance(bench, both, session, admitted)?,

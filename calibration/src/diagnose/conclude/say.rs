@@ -193,8 +193,11 @@ fn in_part<E: Evidence>(case: &Case<'_, E>, partly: &Partly, facts: &Facts, stay
     let [own, rivals] = partly.effects(case.bench);
     let text = headline::in_part(facts, &partly.share, partly.unusual, stays, looks_like, &rivals);
     let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
-    let (kind, confidence) =
-        if rivals.is_empty() { (Kind::Named, sureness(&partly.found)) } else { (Kind::Class, CLASS_IS_RIGHT.value) };
+    let (kind, confidence) = if rivals.is_empty() {
+        (Kind::Named, sureness(&partly.found))
+    } else {
+        (Kind::Class, CLASS_IS_RIGHT.value)
+    };
     Verdict {
         kind,
         confidence,

@@ -6,11 +6,12 @@
 use crate::answer::diagnosis::Share;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::select::gain::MAX_OF_MEDIAN;
-use inference::likelihood::{Evidence, Group};
+use inference::likelihood::{Evidence, Group, Row};
 use inference::statistics::median;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+use shared_mem::msg::MAX_JOINTS;
 
 /// Residuals of clips as the twin alone predicts them, not weighted: what a clip has of its own is not fitted, it is part
 /// of the floor.
@@ -35,6 +36,10 @@ struct Sum {
 }
 
 impl Sum {
+    fn of(residual: f64) -> Self {
+        Self { squares: residual * residual, rows: 1.0 }
+    }
+
     fn with(self, other: Self) -> Self {
         Self { squares: self.squares + other.squares, rows: self.rows + other.rows }
     }
@@ -93,11 +98,12 @@ impl Residuals {
             Some((*clip, out))
         };
         let clips: Vec<(usize, Vec<f64>)> = clips.par_iter().map(one).collect::<Option<_>>()?;
-        let in_pieces = |cut: usize| {
+        let in_pieces = |cut: usize| -> Vec<Sums> {
             clips.iter().flat_map(move |(clip, residuals)| pieces(bench.evidence, *clip, residuals, cut)).collect()
         };
         let (sums, pieces) = (in_pieces(1), in_pieces(MIN_PIECES.div_ceil(clips.len().max(1))));
-        let floors = clips.iter().map(|(clip, _)| sums_of_noise(bench, *clip)).collect();
+        let floor = |(clip, _): &(usize, _)| self::pieces(bench.evidence, *clip, &noise_of_rows(bench, *clip), 1)[0];
+        let floors = clips.iter().map(floor).collect();
         Some(Self { clips, sums, pieces, floors })
     }
 
@@ -119,13 +125,31 @@ impl Residuals {
 
     /// The same among some clips, by their places.
     fn typical_among(&self, places: &[usize], group: Group) -> Option<Typical> {
-        let usual = |sums: &[Sums]| {
-            let values: Vec<f64> = places.iter().filter_map(|place| sums[*place][group as usize].mean()).collect();
-            let logarithms = values.iter().map(|value| value.max(f64::MIN_POSITIVE).ln());
-            (!values.is_empty()).then(|| (logarithms.sum::<f64>() / values.len() as f64).exp())
-        };
+        let usual =
+            |sums: &[Sums]| geometric_mean(places.iter().filter_map(|place| sums[*place][group as usize].mean()));
         let (mean_square, floor) = (usual(&self.sums)?, usual(&self.floors)?);
         Some(Typical { mean_square, floor, of_object: group == Group::Object })
+    }
+
+    /// The arm's group joint by joint, as [`Self::typical`]; joints that no clip shows are left out.
+    pub fn typical_of_joints<E: Evidence>(&self, bench: &Bench<'_, E>) -> Vec<(usize, Typical)> {
+        let channels = bench.evidence.channels();
+        let noise: Vec<Vec<f64>> = self.clips.iter().map(|(clip, _)| noise_of_rows(bench, *clip)).collect();
+        let of_joint = |joint: usize| {
+            let mean_of = |clip: usize, values: &[f64]| {
+                let rows = bench.evidence.rows(clip).iter().zip(values);
+                let of_joint = |(row, value): (&Row, &f64)| {
+                    let channel = &channels[row.channel];
+                    (channel.group == Group::Arm && channel.joint == Some(joint)).then(|| Sum::of(*value))
+                };
+                rows.filter_map(of_joint).fold(Sum::default(), Sum::with).mean()
+            };
+            let left = self.clips.iter().filter_map(|(clip, residuals)| mean_of(*clip, residuals));
+            let floors = self.clips.iter().zip(&noise).filter_map(|((clip, _), noise)| mean_of(*clip, noise));
+            let (mean_square, floor) = (geometric_mean(left)?, geometric_mean(floors)?);
+            Some((joint, Typical { mean_square, floor, of_object: false }))
+        };
+        (0..MAX_JOINTS).filter_map(of_joint).collect()
     }
 
     /// Mean square: the mean over the groups of sensors, so that a thousand encoder rows do not drown the object.
@@ -214,21 +238,25 @@ fn pieces(evidence: &impl Evidence, clip: usize, residuals: &[f64], cut: usize) 
     for (row, residual) in rows.iter().zip(residuals) {
         let piece = ((row.time / last * cut as f64) as usize).min(cut - 1);
         let group = &mut pieces[piece][evidence.channels()[row.channel].group as usize];
-        *group = group.with(Sum { squares: residual * residual, rows: 1.0 });
+        *group = group.with(Sum::of(*residual));
     }
     pieces
 }
 
-/// The sums that noise of one sigma and nuisance parameters that scatter as assumed would give.
-fn sums_of_noise<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Sums {
+fn geometric_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let logarithms: Vec<f64> = values.map(|value| value.max(f64::MIN_POSITIVE).ln()).collect();
+    (!logarithms.is_empty()).then(|| (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp())
+}
+
+/// What noise of one sigma and nuisance parameters that scatter as assumed would give, row by row.
+fn noise_of_rows<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Vec<f64> {
     let rows = bench.evidence.rows(clip);
     let mut squares = vec![1.0; rows.len()];
     for (k, random) in bench.scatter.random.iter().enumerate() {
         let slopes = bench.evidence.own_slope(clip, k).unwrap_or_default();
         squares.iter_mut().zip(slopes).for_each(|(square, slope)| *square += (slope * random.sigma).powi(2));
     }
-    let sigmas: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
-    pieces(bench.evidence, clip, &sigmas, 1)[0]
+    squares.into_iter().map(f64::sqrt).collect()
 }
 
 /// The mean over the groups that have a gap.

@@ -4,8 +4,8 @@
 //! on some clips and harms on others. What is left is then more than another engine's way of integrating leaves.
 
 use super::ends;
-use super::gap::{Typical, explained};
-use crate::answer::diagnosis::{SensorGap, Sensors};
+use super::gap::{Residuals, Typical, explained};
+use crate::answer::diagnosis::{JointGap, SensorGap, Sensors};
 use crate::diagnose::criteria::{
     DOUBTFUL_EXCESS, JOINTS_EXCESS, JOINTS_EXCESS_BESIDE_A_CAUSE, JOINTS_SHARE_LEFT, MOST_OF_IT, OBJECT_EXCESS,
     OBJECT_EXCESS_BESIDE_A_CAUSE, OBJECT_SHARE_LEFT, PLAIN_EXCESS, TURNS_WITHIN,
@@ -69,6 +69,31 @@ impl SensorGap {
     /// Share of the excess that is explained.
     pub fn explained(&self) -> f64 {
         explained(self.before, self.after, self.floor)
+    }
+}
+
+/// What two hypotheses leave in a clip like most.
+#[derive(Debug, Clone)]
+pub struct Left {
+    /// In every group of sensors.
+    pub sensors: Vec<SensorGap>,
+    /// In the arm's group, in every joint.
+    pub joints: Vec<JointGap>,
+}
+
+impl Left {
+    pub fn of<E: Evidence>(bench: &Bench<'_, E>, before: &Residuals, after: &Residuals) -> Self {
+        let [in_joints, of_joints] = [before, after].map(|residuals| residuals.typical_of_joints(bench));
+        let joint = |((joint, before), (_, after)): (&(usize, Typical), &(usize, Typical))| JointGap {
+            joint: joint + 1,
+            before: before.mean_square,
+            after: after.mean_square,
+            floor: before.floor,
+        };
+        Self {
+            sensors: SensorGap::of_groups(&before.typical(), &after.typical()),
+            joints: in_joints.iter().zip(&of_joints).map(joint).collect(),
+        }
     }
 }
 

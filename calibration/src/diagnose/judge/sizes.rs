@@ -2,8 +2,9 @@
 
 use super::gap::{Residuals, explained};
 use super::held_out::HeldOut;
+use super::remainder::Left;
 use super::tolerance::{self, Measured};
-use crate::answer::diagnosis::{Change, Gap, Medians, SensorGap, TorqueRms};
+use crate::answer::diagnosis::{Change, Gap, Medians, TorqueRms};
 use crate::diagnose::work::DiagnoseError;
 
 use crate::diagnose::fit::bench::Bench;
@@ -90,7 +91,7 @@ impl Sizes {
     }
 
     /// With the gap in sigmas: what two hypotheses leave.
-    pub(in crate::diagnose) fn gap(self, [before, shown]: [&Residuals; 2], sensors: Vec<SensorGap>, seed: u64) -> Gap {
+    pub(in crate::diagnose) fn gap(self, [before, shown]: [&Residuals; 2], left: Left, seed: u64) -> Gap {
         Gap {
             unit: "sigma",
             before: before.mean_square(),
@@ -103,7 +104,8 @@ impl Sizes {
             object_add_m: self.add,
             object_add_s_m: self.add_s,
             median: self.median,
-            sensors,
+            sensors: left.sensors,
+            joints: left.joints,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The gap in numbers: before, after, and what noise alone leaves.
 
 use super::has_effects;
-use crate::answer::diagnosis::{Diagnosis, TorqueRms};
+use crate::answer::diagnosis::{Diagnosis, JointGap, TorqueRms};
 use crate::page::figure::bars::{Row, bars};
 use crate::page::frame::legend;
 use maud::{Markup, html};
@@ -52,5 +52,27 @@ pub(super) fn picture(diagnosis: &Diagnosis) -> Markup {
     html! {
         @if both { (legend(&entries)) } @else { (legend(&[entries[0], entries[2]])) }
         (bars(&["before", "after"], &rows))
+    }
+}
+
+/// The arm's gap joint by joint: whether what was added leaves more where it acts than elsewhere.
+pub(super) fn joints(diagnosis: &Diagnosis) -> Markup {
+    let both = has_effects(diagnosis) || diagnosis.nearest.is_some();
+    let times_noise = |mean_square: f64, floor: f64| format!("{:.1}", (mean_square / floor).sqrt());
+    html! {
+        section {
+            h2 { "Joint by joint" }
+            p { "Root mean square of the residuals in a clip like most, in multiples of what noise alone leaves." }
+            table {
+                tr { th { "joint" } th { "before" } @if both { th { "with what was found" } } }
+                @for JointGap { joint, before, after, floor } in &diagnosis.gap.joints {
+                    tr {
+                        td { (joint) }
+                        td { (times_noise(*before, *floor)) }
+                        @if both { td { (times_noise(*after, *floor)) } }
+                    }
+                }
+            }
+        }
     }
 }

@@ -28,6 +28,7 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         @if !diagnosis.places.is_empty() {
             (figure("Where it lies", "Share of the squared gap in each stage, channel and regime.", &map(diagnosis)))
         }
+        @if !diagnosis.gap.joints.is_empty() { (gap::joints(diagnosis)) }
         @if let Some(test) = &diagnosis.stage_test {
             section { h2 { "The arm's, or the object's" } p { (test.text) } }
         }
@@ -173,7 +174,7 @@ fn clip_list(clips: &[String]) -> String {
 pub(super) mod tests {
     use super::*;
     use crate::answer::diagnosis::{
-        Candidate, Change, Clips, Gap, Medians, Nearest, Place, Remedy, Share, Status, Verdict,
+        Candidate, Change, Clips, Gap, JointGap, Medians, Nearest, Place, Remedy, Share, Status, Verdict,
     };
     use crate::answer::{Size, Trace};
     use shared_mem::recording::SessionFiles;
@@ -223,6 +224,7 @@ pub(super) mod tests {
                 explainable_fraction: 0.989,
                 joint_rms_rad: Change { before: Some(0.00213), after: Some(0.00018) },
                 torque_rms: None,
+                joints: vec![JointGap { joint: 4, before: 81.0, after: 1.44, floor: 1.0 }],
                 object_add_m: Change { before: Some(0.0139), after: Some(0.0012) },
                 object_add_s_m: Change::default(),
                 median: Medians::default(),
@@ -282,6 +284,7 @@ pub(super) mod tests {
             "noise alone: 1.00 \u{3c3}\u{b2}",
             "13.9 mm",
             ">reversal<",
+            "<td>4</td><td>9.0</td><td>1.2</td>",
             "clip_05, joint 2",
             "\u{25cf} named",
             "delay 11.9 [11.2, 12.6] ms",
