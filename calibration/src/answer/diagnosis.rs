@@ -287,7 +287,7 @@ pub struct Nearest {
 }
 
 /// A share with its 90 % interval.
-#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Share {
     pub value: f64,
     /// Its interval over clips.

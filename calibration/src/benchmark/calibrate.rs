@@ -2,7 +2,7 @@
 //! records and has diagnosed.
 
 use crate::diagnose::criteria::{self, Criterion};
-use crate::diagnose::{SensorGap, Sensors};
+use crate::diagnose::{SensorGap, Sensors, Share};
 use anyhow::Context;
 use inference::statistics::student_sigmas;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,8 @@ struct Truth {
 struct Verdict {
     kind: String,
     effects: Vec<String>,
+    /// Given where a part of the gap stays.
+    explained_share: Option<Share>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -108,6 +110,7 @@ pub fn regenerate(sessions: &[Labelled]) -> Vec<Regenerated> {
     let said = |kind| all().filter(move |session| session.is(kind));
     let far_below_doubt = |session: &&Labelled| session.gaps() < 0.5 * criteria::DOUBTFUL_EXCESS.value;
     let plain = |session: &&Labelled| session.has_a_plain_gap();
+    let in_part = |session: &&Labelled| session.leaves_a_part();
     let outside = |session: &Labelled| !session.truth.known;
     let [doubtful, turns] = unseen(sessions);
     let found = [
@@ -121,9 +124,10 @@ pub fn regenerate(sessions: &[Labelled]) -> Vec<Regenerated> {
         (criteria::TURNS_WITHIN, turns),
         (criteria::NONE_IS_RIGHT, rate(said("none").filter(far_below_doubt), Labelled::nothing_is_hidden)),
         (criteria::CLASS_IS_RIGHT, rate(said("class"), Labelled::holds_what_is_hidden)),
+        (criteria::PART_IS_RIGHT, rate(said("named").filter(in_part), Labelled::is_named_rightly)),
         (criteria::UNKNOWN_IS_RIGHT, rate(said("unexplained").filter(plain), outside)),
         (criteria::UNKNOWN_OF_LITTLE_IS_RIGHT, rate(said("unexplained").filter(|s| !plain(s)), outside)),
-        (criteria::NAMED_IS_WRONG, rate(said("named"), Labelled::names_what_is_not_there)),
+        (criteria::NAMED_IS_WRONG, rate(said("named").filter(|s| !in_part(s)), Labelled::names_what_is_not_there)),
     ];
     let one = |(criterion, (from_sessions, sessions)): (Criterion, (Option<f64>, usize))| {
         let Criterion { name, unit, meaning, value: in_use } = criterion;
@@ -139,6 +143,11 @@ impl Labelled {
 
     fn is(&self, kind: &str) -> bool {
         self.said.verdict.kind == kind
+    }
+
+    /// Whether a part of the gap stays beside what was said.
+    fn leaves_a_part(&self) -> bool {
+        self.said.verdict.explained_share.is_some()
     }
 
     /// Whether what was said holds all that is hidden.
@@ -244,10 +253,8 @@ mod tests {
             SensorGap { sensors: Sensors::Joints, before: 1.05, after: 1.05, floor: 1.0 },
             SensorGap { sensors: Sensors::Object, before, after, floor: 1.0 },
         ];
-        Labelled {
-            truth: Truth { effects: names(hidden), known },
-            said: Diagnosis { verdict: Verdict { kind: kind.into(), effects: names(said) }, gap: Gap { sensors } },
-        }
+        let verdict = Verdict { kind: kind.into(), effects: names(said), explained_share: None };
+        Labelled { truth: Truth { effects: names(hidden), known }, said: Diagnosis { verdict, gap: Gap { sensors } } }
     }
 
     fn found(sessions: &[Labelled], criterion: &Criterion) -> Regenerated {
@@ -287,6 +294,11 @@ mod tests {
         );
         let wrong = found(&sessions, &criteria::NAMED_IS_WRONG);
         assert_eq!((wrong.sessions, wrong.from_sessions), (7, Some(1.5 / 8.0)));
+        for session in &mut sessions {
+            session.said.verdict.explained_share = Some(Share::default());
+        }
+        let in_part = found(&sessions, &criteria::PART_IS_RIGHT);
+        assert_eq!((in_part.sessions, in_part.from_sessions), (7, Some(6.5 / 8.0)));
     }
 
     #[test]
@@ -320,9 +332,10 @@ mod tests {
             .collect();
         let rows = regenerate(&sessions);
         let names: std::collections::BTreeSet<&str> = rows.iter().map(|row| row.name).collect();
-        assert_eq!((names.len(), rows.len()), (13, 13));
-        // The joints of these sessions have no gap of which a cause could leave anything.
+        assert_eq!((names.len(), rows.len()), (14, 14));
+        // The joints of these sessions have no gap of which a cause could leave anything, and no part of one stays.
         let open: Vec<&str> = rows.iter().filter(|row| row.from_sessions.is_none()).map(|row| row.name).collect();
-        assert_eq!(open, [criteria::JOINTS_EXCESS_BESIDE_A_CAUSE.name, criteria::JOINTS_SHARE_LEFT.name], "{rows:?}");
+        let few = [criteria::JOINTS_EXCESS_BESIDE_A_CAUSE, criteria::JOINTS_SHARE_LEFT, criteria::PART_IS_RIGHT];
+        assert_eq!(open, few.map(|criterion| criterion.name), "{rows:?}");
     }
 }

@@ -2,6 +2,7 @@
 
 use super::verdict::{Decision, Finding};
 use crate::answer::diagnosis::{Kind, Share};
+use crate::diagnose::criteria::UNKNOWN_OF_LITTLE_IS_RIGHT;
 use crate::diagnose::judge::closing::MIN_SHARE_CLOSED;
 use crate::diagnose::judge::gap::Shrunk;
 use crate::words::quantity::UNBOUNDED;
@@ -194,9 +195,12 @@ fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> Str
         )
     });
     let weak = if decision.little {
-        "; an effect of the library may also act too weakly to be identified in so small a gap"
+        let share = percent(1.0 - UNKNOWN_OF_LITTLE_IS_RIGHT.value);
+        format!(
+            "; in {share} of simulated sessions with so small a gap an effect of the library acted, too weakly to be identified"
+        )
     } else {
-        ""
+        String::new()
     };
     format!(
         "No effect of the library explains the gap, {}, {:.1} times what noise alone leaves{nearest}{drift}{weak}.",
@@ -304,6 +308,7 @@ mod tests {
     fn where_nothing_is_found_the_size_is_said_in_noise() {
         let text = said(&finding(vec![], 4.0, 4.0), &[]);
         assert!(text.contains("2.0 times what noise alone leaves"), "{text}");
+        assert!(text.contains("% of simulated sessions with so small a gap"), "{text}");
         assert!(said(&finding(vec![], 1.5, 1.5), &[]).starts_with("No gap: "));
         let text = said(&finding(vec!["payload"], 500.0, 200.0), &["payload (mass 0.4 kg)"]);
         assert!(text.starts_with("No effect of the library explains the gap, 2.13 mrad RMS"), "{text}");

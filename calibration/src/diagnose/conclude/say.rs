@@ -8,7 +8,7 @@ use super::site::{Advice, Site};
 use super::{advice, ranked, remedies, verdict};
 use crate::answer::Trace;
 use crate::answer::diagnosis::{Clips, Diagnosis, Gap, Kind, Nearest, NextMotion, Place, Rest, Verdict};
-use crate::diagnose::criteria::CLASS_IS_RIGHT;
+use crate::diagnose::criteria::{CLASS_IS_RIGHT, PART_IS_RIGHT};
 use crate::diagnose::fit::bench::Hypothesis;
 use crate::diagnose::judge::gap::Residuals;
 use crate::diagnose::judge::held_out::estimated;
@@ -194,7 +194,7 @@ fn in_part<E: Evidence>(case: &Case<'_, E>, partly: &Partly, facts: &Facts, stay
     let text = headline::in_part(facts, &partly.share, partly.unusual, stays, looks_like, &rivals);
     let (place, looks_like) = (facts.rest.clone(), looks_like.map(str::to_owned));
     let (kind, confidence) = if rivals.is_empty() {
-        (Kind::Named, sureness(&partly.found))
+        (Kind::Named, sureness(&partly.found).min(PART_IS_RIGHT.value))
     } else {
         (Kind::Class, CLASS_IS_RIGHT.value)
     };

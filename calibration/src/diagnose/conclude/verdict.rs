@@ -2,7 +2,7 @@
 
 use crate::answer::diagnosis::{Basis, Kind, SensorGap, Verdict};
 use crate::diagnose::criteria::{
-    CLASS_IS_RIGHT, MOST_OF_IT, NONE_IS_RIGHT, UNKNOWN_IS_RIGHT, UNKNOWN_OF_LITTLE_IS_RIGHT,
+    CLASS_IS_RIGHT, MOST_OF_IT, NONE_IS_RIGHT, PART_IS_RIGHT, UNKNOWN_IS_RIGHT, UNKNOWN_OF_LITTLE_IS_RIGHT,
 };
 use crate::diagnose::judge::confidence;
 use std::time::Duration;
@@ -75,6 +75,7 @@ impl Verdict {
     /// What [`Verdict::confidence`] is.
     pub fn basis(&self) -> Basis {
         let most = match self.kind {
+            Kind::Named if self.explained_share.is_some() => PART_IS_RIGHT.value,
             Kind::Named => confidence::MAX_PROBABILITY,
             Kind::None => NONE_IS_RIGHT.value,
             Kind::Class | Kind::Unexplained => return Basis::Rate,
