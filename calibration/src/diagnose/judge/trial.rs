@@ -189,8 +189,8 @@ impl Step {
         let (of_arm, much) = (library.is_of_arm(candidate), closes > LARGE_SHARE_CLOSED);
         // Strokes of two engines differ by so much anyway that a little gain on most of them shows nothing ...
         let shown = of_arm || self.object_gap() || (much && self.is_alone(library, candidate));
-        // ... and beside a cause that was found before, a gain on nearly all of them neither.
-        let may_show = shown || self.from.effects.is_empty();
+        // ... and beside a cause that was found before, a gain on nearly all of them neither, unless it is far beyond chance.
+        let may_show = shown || self.from.effects.is_empty() || gain.nats > NO_CHANCE_SIGMAS * gain.error;
         let plain = much && gain.in_nearly_all() && gain.nats > EFFECTS.min_gain_nats && may_show;
         let proven = EFFECTS.proves(gain, trial.scored.cost) && shown;
         let beside_contact = trial.shows_beside_contact() && gain.nats > EFFECTS.price(trial.scored.cost);
