@@ -102,7 +102,13 @@ fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>
         return "the size fitted is negligible: two simulations of one cell differ by as much".into();
     }
     if full.is_some_and(|fit| bench.is_convention(effect, fit)) {
-        return "does no more than shift commands by one control period beside another effect that shifts them".into();
+        let convention = match bench.library.is_of_arm(effect) {
+            true => "does no more than shift commands by one control period beside another effect that shifts them",
+            false => {
+                "the contact fitted is any engine's: a spring with a damper returns an eighth to a quarter of the speed of a hit"
+            }
+        };
+        return convention.into();
     }
     let step = &found.steps[judged.place];
     if bench.library.candidates[effect].is_of_arm() && advantage.nats <= MIN_NATS_PER_ROW * step.arm_rows as f64 {

@@ -121,6 +121,11 @@ impl<V> Hypothesis<V> {
 const NEGLIGIBLE_SHARE: f64 = 0.008;
 /// A control period and a half [s].
 const DELAY_OF_CONVENTION: f64 = 1.5e-3;
+/// What a contact returns of the speed of a hit that is a spring and a damper and cannot pull, at damping ratios from 1 to 0.6:
+/// `exp(-2 z atan2(w, z) / w)`, `w = sqrt(1 - z^2)`, so `exp(-2)` to 0.25, and a fiftieth for what a fit is off by [1].
+const RESTITUTION_OF_ENGINES: [f64; 2] = [0.115, 0.27];
+/// A contact of 3 ms under half a kilogram [m/N].
+const COMPLIANCE_OF_ENGINES: f64 = 2e-5;
 /// Steps in which a clip finds its nuisance parameters.
 const PROFILE_STEPS: usize = 2;
 
@@ -307,9 +312,26 @@ impl<E: Likelihood> Bench<'_, E> {
         shares.fold(0.0, f64::max) < least(candidate.effect)
     }
 
-    /// Whether an effect of a hypothesis does no more to commands that another changes already than shift them by a control
-    /// period: from which period on a filtered command acts is every engine's own.
+    /// Whether an effect of a hypothesis is every engine's own: what any two of them differ by.
     pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis<E::Own>) -> bool {
+        self.is_a_period_more(effect, hypothesis) || self.is_ordinary_contact(effect, &hypothesis.full)
+    }
+
+    /// Whether an effect makes the tool's contact no other than those of engines in which nothing is wrong.
+    fn is_ordinary_contact(&self, effect: usize, full: &[f64]) -> bool {
+        let candidate = &self.library.candidates[effect];
+        let number = |name: &str| {
+            let place = candidate.effect.parameters.iter().position(|parameter| parameter.name == name)?;
+            Some(full[candidate.numbers.start + place])
+        };
+        let (restitution, compliance) = (number("restitution"), number("compliance"));
+        let [low, high] = RESTITUTION_OF_ENGINES;
+        restitution.is_some_and(|e| (low..=high).contains(&e)) && compliance.is_some_and(|c| c < COMPLIANCE_OF_ENGINES)
+    }
+
+    /// Whether an effect does no more to commands that another changes already than shift them by a control period: from which
+    /// period on a filtered command acts differs.
+    fn is_a_period_more(&self, effect: usize, hypothesis: &Hypothesis<E::Own>) -> bool {
         let of_commands = |k: &usize| self.library.candidates[*k].effect.acts_on == Place::CommandPath;
         let weak = |size: &usize| hypothesis.full[*size] - self.library.unknowns[*size].start < DELAY_OF_CONVENTION;
         of_commands(&effect)
@@ -335,4 +357,41 @@ struct Polar {
     across: f64,
     /// The angle at which the size acts across.
     quarter: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::test_bench::{on_strokes, shipped};
+    use worlds::world::{Fault, Kind, World};
+
+    #[test]
+    fn a_contact_as_any_engine_has_it_is_no_cause() {
+        let cell = shipped();
+        on_strokes((&cell, &World::draw(3, Kind::Strokes, Fault::Nothing, &cell)), |bench, _| {
+            for name in ["restitution", "contact_compliance"] {
+                let effect = bench.library.find(name).expect("a candidate");
+                let ordinary = |restitution: f64, compliance: f64| {
+                    let mut full = bench.library.start();
+                    for (k, parameter) in bench.library.candidates[effect]
+                        .numbers
+                        .clone()
+                        .zip(bench.library.candidates[effect].effect.parameters)
+                    {
+                        full[k] = if parameter.name == "restitution" { restitution } else { compliance };
+                    }
+                    let hypothesis = Hypothesis { effects: vec![effect], full, free: Vec::new(), fitted: Vec::new() };
+                    bench.is_convention(effect, &hypothesis)
+                };
+                assert!(ordinary(0.19, 1e-6) && ordinary((-2f64).exp(), 1e-5), "{name}");
+                assert!(!ordinary(0.34, 1e-6) && !ordinary(0.05, 1e-6) && !ordinary(0.2, 1e-4), "{name}");
+            }
+            let tip = bench.library.find("tool_offset").expect("a candidate");
+            let full = bench.library.start();
+            assert!(
+                !bench
+                    .is_convention(tip, &Hypothesis { effects: vec![tip], full, free: Vec::new(), fitted: Vec::new() })
+            );
+        });
+    }
 }
