@@ -369,29 +369,25 @@ mod tests {
     fn a_contact_as_any_engine_has_it_is_no_cause() {
         let cell = shipped();
         on_strokes((&cell, &World::draw(3, Kind::Strokes, Fault::Nothing, &cell)), |bench, _| {
-            for name in ["restitution", "contact_compliance"] {
+            let ordinary = |name: &str, restitution: f64, compliance: f64| {
                 let effect = bench.library.find(name).expect("a candidate");
-                let ordinary = |restitution: f64, compliance: f64| {
-                    let mut full = bench.library.start();
-                    for (k, parameter) in bench.library.candidates[effect]
-                        .numbers
-                        .clone()
-                        .zip(bench.library.candidates[effect].effect.parameters)
-                    {
-                        full[k] = if parameter.name == "restitution" { restitution } else { compliance };
+                let (candidate, mut full) = (&bench.library.candidates[effect], bench.library.start());
+                for (k, parameter) in candidate.numbers.clone().zip(candidate.effect.parameters) {
+                    match parameter.name {
+                        "restitution" => full[k] = restitution,
+                        "compliance" => full[k] = compliance,
+                        _ => {}
                     }
-                    let hypothesis = Hypothesis { effects: vec![effect], full, free: Vec::new(), fitted: Vec::new() };
-                    bench.is_convention(effect, &hypothesis)
-                };
-                assert!(ordinary(0.19, 1e-6) && ordinary((-2f64).exp(), 1e-5), "{name}");
-                assert!(!ordinary(0.34, 1e-6) && !ordinary(0.05, 1e-6) && !ordinary(0.2, 1e-4), "{name}");
+                }
+                let hypothesis = Hypothesis { effects: vec![effect], full, free: Vec::new(), fitted: Vec::new() };
+                bench.is_convention(effect, &hypothesis)
+            };
+            for name in ["restitution", "contact_compliance"] {
+                assert!(ordinary(name, 0.19, 1e-6) && ordinary(name, (-2f64).exp(), 1e-5), "{name}");
+                assert!(!ordinary(name, 0.34, 1e-6) && !ordinary(name, 0.05, 1e-6), "{name}: another restitution");
+                assert!(!ordinary(name, 0.2, 1e-4), "{name}: softer");
             }
-            let tip = bench.library.find("tool_offset").expect("a candidate");
-            let full = bench.library.start();
-            assert!(
-                !bench
-                    .is_convention(tip, &Hypothesis { effects: vec![tip], full, free: Vec::new(), fitted: Vec::new() })
-            );
+            assert!(!ordinary("tool_offset", 0.2, 1e-6), "it is no contact's");
         });
     }
 }
