@@ -107,6 +107,8 @@ pub struct Parameter {
     pub begun_at: &'static [&'static [f64]],
     /// Whether the arm feels the effect where this is not 0, though it shows first in the hit, the slide or the camera.
     pub felt_by_arm: bool,
+    /// Where it lies in engines in which nothing is wrong, though not two of them agree: an effect of which all parameters do is none.
+    pub of_engines: Option<[f64; 2]>,
     /// Whether it moves the tip while the arm's own sensors see nothing: in strokes it is the object that tells it.
     pub moves_tip_unseen: bool,
 }
@@ -126,6 +128,7 @@ impl Parameter {
             search: Search::Slope,
             begun_at: &[],
             felt_by_arm: false,
+            of_engines: None,
             moves_tip_unseen: false,
         }
     }
@@ -165,6 +168,10 @@ impl Parameter {
 
     pub(super) const fn felt_by_arm(self) -> Self {
         Self { felt_by_arm: true, ..self }
+    }
+
+    pub(super) const fn of_engines(self, range: [f64; 2]) -> Self {
+        Self { of_engines: Some(range), ..self }
     }
 
     pub(super) const fn moves_tip_unseen(self) -> Self {

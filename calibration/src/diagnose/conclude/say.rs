@@ -24,8 +24,6 @@ use inference::likelihood::{Evidence, Group};
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 
-/// What noise alone leaves: residuals are in sigmas of the sensors.
-const NOISE_FLOOR: f64 = 1.0;
 /// So many traces are shown (a choice).
 const SHOWN_TRACES: usize = 12;
 
@@ -35,7 +33,8 @@ pub fn not_testable(session: &Session, options: &Options, why: &str) -> Diagnosi
     let next = advice::lacking(why, &site);
     // What was known before; nothing was found.
     let theta = options.theta.clone().unwrap_or_default();
-    let gap = Gap { unit: "sigma", floor: NOISE_FLOOR, ..Gap::default() };
+    // Residuals are in sigmas of the sensors: noise leaves 1.
+    let gap = Gap { unit: "sigma", floor: 1.0, ..Gap::default() };
     Diagnosis { gap, theta, ..about(session, options, &site, verdict::not_testable(why), next) }
 }
 

@@ -12,7 +12,7 @@ use inference::likelihood::random_effects::{RandomEffects, WithOwn};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
-use twin::effects::{EffectInfo, Place, Role};
+use twin::effects::{EffectInfo, Parameter, Place, Role};
 
 /// What every step of the diagnosis is given.
 pub struct Bench<'a, E> {
@@ -121,11 +121,6 @@ impl<V> Hypothesis<V> {
 const NEGLIGIBLE_SHARE: f64 = 0.008;
 /// A control period and a half [s].
 const DELAY_OF_CONVENTION: f64 = 1.5e-3;
-/// What a contact returns of the speed of a hit that is a spring and a damper and cannot pull, at damping ratios from 1 to 0.6:
-/// `exp(-2 z atan2(w, z) / w)`, `w = sqrt(1 - z^2)`, so `exp(-2)` to 0.25, and a fiftieth for what a fit is off by [1].
-const RESTITUTION_OF_ENGINES: [f64; 2] = [0.115, 0.27];
-/// A contact of 3 ms under half a kilogram [m/N].
-const COMPLIANCE_OF_ENGINES: f64 = 2e-5;
 /// Steps in which a clip finds its nuisance parameters.
 const PROFILE_STEPS: usize = 2;
 
@@ -314,19 +309,17 @@ impl<E: Likelihood> Bench<'_, E> {
 
     /// Whether an effect of a hypothesis is every engine's own: what any two of them differ by.
     pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis<E::Own>) -> bool {
-        self.is_a_period_more(effect, hypothesis) || self.is_ordinary_contact(effect, &hypothesis.full)
+        self.is_a_period_more(effect, hypothesis) || self.is_of_engines(effect, &hypothesis.full)
     }
 
-    /// Whether an effect makes the tool's contact no other than those of engines in which nothing is wrong.
-    fn is_ordinary_contact(&self, effect: usize, full: &[f64]) -> bool {
+    /// Whether all of an effect lies where it does in engines in which nothing is wrong.
+    fn is_of_engines(&self, effect: usize, full: &[f64]) -> bool {
         let candidate = &self.library.candidates[effect];
-        let number = |name: &str| {
-            let place = candidate.effect.parameters.iter().position(|parameter| parameter.name == name)?;
-            Some(full[candidate.numbers.start + place])
+        // Such effects have parameters of one number each.
+        let lies = |(k, parameter): (usize, &Parameter)| {
+            parameter.of_engines.is_some_and(|[low, high]| (low..=high).contains(&full[k]))
         };
-        let (restitution, compliance) = (number("restitution"), number("compliance"));
-        let [low, high] = RESTITUTION_OF_ENGINES;
-        restitution.is_some_and(|e| (low..=high).contains(&e)) && compliance.is_some_and(|c| c < COMPLIANCE_OF_ENGINES)
+        candidate.numbers.clone().zip(candidate.effect.parameters).all(lies)
     }
 
     /// Whether an effect does no more to commands that another changes already than shift them by a control period: from which
@@ -366,28 +359,29 @@ mod tests {
     use worlds::world::{Fault, Kind, World};
 
     #[test]
-    fn a_contact_as_any_engine_has_it_is_no_cause() {
+    fn an_effect_that_lies_where_any_engine_has_it_is_no_cause() {
         let cell = shipped();
         on_strokes((&cell, &World::draw(3, Kind::Strokes, Fault::Nothing, &cell)), |bench, _| {
-            let ordinary = |name: &str, restitution: f64, compliance: f64| {
-                let effect = bench.library.find(name).expect("a candidate");
-                let (candidate, mut full) = (&bench.library.candidates[effect], bench.library.start());
-                for (k, parameter) in candidate.numbers.clone().zip(candidate.effect.parameters) {
-                    match parameter.name {
-                        "restitution" => full[k] = restitution,
-                        "compliance" => full[k] = compliance,
-                        _ => {}
+            let mut with_a_range = 0;
+            for (effect, candidate) in bench.library.candidates.iter().enumerate() {
+                let at = |share: f64| {
+                    let mut full = bench.library.start();
+                    for (k, parameter) in candidate.numbers.clone().zip(candidate.effect.parameters) {
+                        full[k] = parameter.of_engines.map_or(full[k], |[low, high]| low + share * (high - low));
                     }
-                }
-                let hypothesis = Hypothesis { effects: vec![effect], full, free: Vec::new(), fitted: Vec::new() };
-                bench.is_convention(effect, &hypothesis)
-            };
-            for name in ["restitution", "contact_compliance"] {
-                assert!(ordinary(name, 0.19, 1e-6) && ordinary(name, (-2f64).exp(), 1e-5), "{name}");
-                assert!(!ordinary(name, 0.34, 1e-6) && !ordinary(name, 0.05, 1e-6), "{name}: another restitution");
-                assert!(!ordinary(name, 0.2, 1e-4), "{name}: softer");
+                    let hypothesis = Hypothesis { effects: vec![effect], full, free: Vec::new(), fitted: Vec::new() };
+                    bench.is_convention(effect, &hypothesis)
+                };
+                let ranges = candidate.effect.parameters.iter().all(|parameter| parameter.of_engines.is_some());
+                assert_eq!(
+                    [0.01, 0.5, 0.99, 1.01].map(at),
+                    [ranges, ranges, ranges, false],
+                    "{}",
+                    candidate.effect.name
+                );
+                with_a_range += usize::from(ranges);
             }
-            assert!(!ordinary("tool_offset", 0.2, 1e-6), "it is no contact's");
+            assert!(with_a_range > 0);
         });
     }
 }

@@ -7,7 +7,7 @@
 //! - Signature (H8): extra impulse from the controller, which depends on its gains and on the follow-through.
 //! - Confused with: restitution, tip friction, tracker smoothing (softens the corner at impact too).
 
-use crate::contact_law::{ContactLaw, RESTITUTION};
+use crate::contact_law::{COMPLIANCE_OF_ENGINES, ContactLaw, RESTITUTION, RESTITUTION_OF_ENGINES};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
 use crate::effects::parameter::Parameter;
@@ -18,8 +18,10 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Hit,
     acts_on: Place::ToolContact,
     parameters: &[
-        Parameter::size("compliance", "m/N", [0.0, 1e-3], 0.0).within(0.0, 1.0),
-        Parameter::form("restitution", "1", [0.02, 0.5], RESTITUTION).within(0.0, 1.0),
+        Parameter::size("compliance", "m/N", [0.0, 1e-3], 0.0).within(0.0, 1.0).of_engines(COMPLIANCE_OF_ENGINES),
+        Parameter::form("restitution", "1", [0.02, 0.5], RESTITUTION)
+            .within(0.0, 1.0)
+            .of_engines(RESTITUTION_OF_ENGINES),
     ],
     confusable_with: &["restitution", "tip_friction", "tracker_smoothing"],
     separated: &[],

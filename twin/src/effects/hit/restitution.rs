@@ -7,7 +7,7 @@
 //! - Signature (H1): the same ratio of speeds after and before at all speeds.
 //! - Confused with: the object's mass and inertia, contact compliance (depends on speed and gains), tip friction.
 
-use crate::contact_law::{ContactLaw, RESTITUTION};
+use crate::contact_law::{COMPLIANCE_OF_ENGINES, ContactLaw, RESTITUTION, RESTITUTION_OF_ENGINES};
 use crate::effects::change::Change;
 use crate::effects::info::{EffectInfo, Place, Stage};
 use crate::effects::parameter::Parameter;
@@ -19,8 +19,10 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
     stage: Stage::Hit,
     acts_on: Place::ToolContact,
     parameters: &[
-        Parameter::size("restitution", "1", [0.02, 0.9], RESTITUTION).within(0.0, 1.0),
-        Parameter::form("compliance", "m/N", [0.0, 5e-5], 0.0).within(0.0, 1.0),
+        Parameter::size("restitution", "1", [0.02, 0.9], RESTITUTION)
+            .within(0.0, 1.0)
+            .of_engines(RESTITUTION_OF_ENGINES),
+        Parameter::form("compliance", "m/N", [0.0, 5e-5], 0.0).within(0.0, 1.0).of_engines(COMPLIANCE_OF_ENGINES),
     ],
     confusable_with: &["object_inertia", "contact_compliance", "tip_friction"],
     separated: &[Separation {
