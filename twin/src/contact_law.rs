@@ -16,10 +16,10 @@ pub struct ContactLaw {
 pub const STIFFNESS: f64 = 2.0e6;
 /// Such tips and boxes bounce little. 0.135, that of a critically damped contact, and 0.3 move the same gap by up to 1 mm.
 pub const RESTITUTION: f64 = 0.25;
-/// What a contact returns that is a spring and a damper and cannot pull, at damping ratios `z` from 1 to 0.6:
-/// `exp(-2 z atan2(w, z) / w)`, `w = sqrt(1 - z^2)`, so `exp(-2)` to a quarter, and a fiftieth for what a fit is off by [1].
+/// What a contact returns that is a spring and a damper and cannot pull (the law of [`crate::physics::hit`]), at damping ratios from 1 to
+/// 0.6: `exp(-2)` to a quarter, and a fiftieth to either side for what a fit is off by (a choice) [1].
 pub const RESTITUTION_OF_ENGINES: [f64; 2] = [0.115, 0.27];
-/// In series with it at most a contact of 3 ms under half a kilogram [m/N].
+/// In series with it at most a contact of 3 ms under half a kilogram: `(3e-3 s)^2 / 0.45 kg` [m/N].
 pub const COMPLIANCE_OF_ENGINES: [f64; 2] = [0.0, 2e-5];
 
 impl ContactLaw {

@@ -160,6 +160,7 @@ fn restitution_of(ratio: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact_law::RESTITUTION_OF_ENGINES;
     use crate::physics::TableObject;
     use crate::physics::test_box::{box_model, nominal};
     use crate::physics::touch::Capsule;
@@ -209,6 +210,13 @@ mod tests {
     }
 
     const FINE: f64 = 6.25e-5;
+
+    #[test]
+    fn contacts_of_engines_return_what_a_spring_and_a_damper_do() {
+        let [low, high] = RESTITUTION_OF_ENGINES;
+        let [critical, light] = [1.0, 0.6].map(restitution_of);
+        assert!((critical - 0.02 - low).abs() < 2e-3 && (light + 0.02 - high).abs() < 2e-3, "{critical} {light}");
+    }
 
     #[test]
     fn momentum_is_conserved_in_a_free_impact() {
