@@ -197,7 +197,8 @@ fn unexplained(decision: &Decision, finding: &Finding<'_>, facts: &Facts) -> Str
     let weak = if decision.little {
         let share = percent(1.0 - UNKNOWN_OF_LITTLE_IS_RIGHT.value);
         format!(
-            "; in {share} of simulated sessions with so small a gap an effect of the library acted, too weakly to be identified"
+            "; in {share} of simulated sessions with so small a gap no unknown cause acted, but an effect of the library too weakly to be \
+             identified, or nothing"
         )
     } else {
         String::new()

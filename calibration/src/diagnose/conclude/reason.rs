@@ -104,9 +104,7 @@ fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>
     if full.is_some_and(|fit| bench.is_convention(effect, fit)) {
         let convention = match bench.library.is_of_arm(effect) {
             true => "does no more than shift commands by one control period beside another effect that shifts them",
-            false => {
-                "the contact fitted is any engine's: a spring with a damper returns an eighth to a quarter of the speed of a hit"
-            }
+            false => "what was fitted lies where engines with nothing wrong in them lie: no two of them agree on it",
         };
         return convention.into();
     }
