@@ -12,7 +12,7 @@
 #![allow(non_snake_case)] // tau_J is the Franka Control Interface's own symbol
 
 use super::dry_friction::{Presliding, Yields};
-use super::kernel::{Chain, factor, filled, first, solve, with_dof};
+use super::kernel::{Chain, factor, first, solve, with_dof};
 use super::{ArmModel, JointState, Joints};
 
 /// A gear that yields.
@@ -102,6 +102,25 @@ struct Side {
     spring: Option<Spring>,
 }
 
+/// The links' equations at one state: lower triangle of the mass matrix, rotors on its diagonal, and the torques that
+/// gravity and velocities ask for.
+struct Equations<const N: usize> {
+    mass: [[f64; N]; N],
+    bias: [f64; N],
+}
+
+impl<const N: usize> Equations<N> {
+    fn stage(&self, sides: [Side; N], external: &Joints, dt: f64) -> Stage<N> {
+        let mut mass = self.mass;
+        for i in 0..N {
+            if sides[i].spring.is_some() {
+                mass[i][i] = (mass[i][i] - sides[i].rotor).max(LEAST_INERTIA);
+            }
+        }
+        Stage { dt, mass, force: std::array::from_fn(|i| external[i] - self.bias[i]), sides }
+    }
+}
+
 /// Equations of one stage of length `dt`: everything but the unknown accelerations.
 struct Stage<const N: usize> {
     dt: f64,
@@ -133,41 +152,51 @@ impl ArmModel {
     /// Moves `link` and `motor` on by `dt` seconds under constant motor torques `tau` and external torques at the links,
     /// and returns the mean torque behind the gears. Where the gear is rigid, `motor` follows `link`. `bent`: by what share of
     /// what they can the bristles of [`Presliding`] are bent, -1 to 1.
+    ///
+    /// In `parts` > 1 what lies between motor and link is integrated in so many steps, and the links' inertia and bias are those
+    /// of the middle of `dt`: what they change by before and after it cancels to the second order.
     pub fn step_through(
         &self,
         transmission: &impl Transmission,
         (link, motor, bent): (&mut JointState, &mut JointState, &mut Joints),
         (tau, external): (&Joints, &Joints),
-        dt: f64,
+        (dt, parts): (f64, usize),
     ) -> Passed {
         with_dof!(self, N => {
-            let sides = |at: &JointState, dt: f64| self.sides::<N>(transmission, (link, motor, bent), (at, tau), dt);
-            let mut modes = None;
-            let half = self.stage(link, sides(motor, 0.5 * dt), external, 0.5 * dt).answer(&mut modes);
-            let middle = |state: &JointState, acceleration: &[f64; N]| {
-                let mut out = *state;
-                for (i, acceleration) in acceleration.iter().enumerate() {
-                    out.q[i] += 0.5 * dt * state.dq[i];
-                    out.dq[i] += 0.5 * dt * acceleration;
-                }
-                out
-            };
-            let sides = sides(&middle(motor, &half.motor), dt);
-            let mut stage = self.stage(&middle(link, &half.link), sides, external, dt);
-            let answer = stage.answer(&mut modes);
-            let modes = modes.expect("an answer leaves its pattern");
-            for (i, (dry, gear)) in modes.into_iter().enumerate() {
-                let side = &stage.sides[i];
-                let sticks = dry == Dry::Sticks && side.yields == Yields::Nowhere;
-                bent[i] = side.yields.bent((side.motor_speed, side.motor_speed + dt * answer.motor[i]), dt);
-                advance(link, i, answer.link[i], sticks && gear == Gear::Rigid, dt);
-                match gear {
-                    Gear::Rigid => (motor.q[i], motor.dq[i]) = (link.q[i], link.dq[i]),
-                    _ => advance(motor, i, answer.motor[i], sticks, dt),
+            let part = dt / parts as f64;
+            let beginning = self.equations::<N>(link);
+            let middle_of_all = (parts > 1).then(|| {
+                let sides = self.sides::<N>(transmission, (link, motor, bent), (motor, tau), 0.5 * part);
+                let began = beginning.stage(sides, external, 0.5 * part).answer(&mut None);
+                self.equations(&middle(link, &began.link, dt))
+            });
+            let mut whole = Passed::default();
+            for _ in 0..parts {
+                let sides = |at: &JointState, dt: f64| self.sides::<N>(transmission, (link, motor, bent), (at, tau), dt);
+                let mut modes = None;
+                let equations = middle_of_all.as_ref().unwrap_or(&beginning);
+                let half = equations.stage(sides(motor, 0.5 * part), external, 0.5 * part).answer(&mut modes);
+                let sides = sides(&middle(motor, &half.motor, part), part);
+                let mut stage = match &middle_of_all {
+                    Some(equations) => equations.stage(sides, external, part),
+                    None => self.equations(&middle(link, &half.link, part)).stage(sides, external, part),
+                };
+                let answer = stage.answer(&mut modes);
+                let modes = modes.expect("an answer leaves its pattern");
+                for (i, (dry, gear)) in modes.into_iter().enumerate() {
+                    let side = &stage.sides[i];
+                    let sticks = dry == Dry::Sticks && side.yields == Yields::Nowhere;
+                    bent[i] = side.yields.bent((side.motor_speed, side.motor_speed + part * answer.motor[i]), part);
+                    advance(link, i, answer.link[i], sticks && gear == Gear::Rigid, part);
+                    match gear {
+                        Gear::Rigid => (motor.q[i], motor.dq[i]) = (link.q[i], link.dq[i]),
+                        _ => advance(motor, i, answer.motor[i], sticks, part),
+                    }
+                    whole.tau_J[i] += answer.gear[i] / parts as f64;
+                    whole.grip[i] = side.grip(modes[i], answer.motor[i], part);
                 }
             }
-            let grip = std::array::from_fn(|i| stage.sides[i].grip(modes[i], answer.motor[i], dt));
-            Passed { tau_J: filled(&answer.gear), grip: filled::<N>(&grip) }
+            whole
         })
     }
 
@@ -195,19 +224,22 @@ impl ArmModel {
         std::array::from_fn(|i| side(i).yielding_at(2.0 * at.dq[i] - motor.dq[i], dt))
     }
 
-    fn stage<const N: usize>(&self, at: &JointState, sides: [Side; N], external: &Joints, dt: f64) -> Stage<N> {
+    fn equations<const N: usize>(&self, at: &JointState) -> Equations<N> {
         let links = first::<N, _>(&self.links);
         let chain = Chain::at(links, first(&at.q));
         let bodies = chain.bodies(links);
-        let bias = chain.bias(&bodies, first(&at.dq), self.gravity);
-        let mut mass = chain.mass_matrix(&bodies, links);
-        for i in 0..N {
-            if sides[i].spring.is_some() {
-                mass[i][i] = (mass[i][i] - sides[i].rotor).max(LEAST_INERTIA);
-            }
-        }
-        Stage { dt, mass, force: std::array::from_fn(|i| external[i] - bias[i]), sides }
+        Equations { mass: chain.mass_matrix(&bodies, links), bias: chain.bias(&bodies, first(&at.dq), self.gravity) }
     }
+}
+
+/// Half a step of `dt` further at constant acceleration, positions by the speed of the begin.
+fn middle<const N: usize>(state: &JointState, acceleration: &[f64; N], dt: f64) -> JointState {
+    let mut out = *state;
+    for (i, acceleration) in acceleration.iter().enumerate() {
+        out.q[i] += 0.5 * dt * state.dq[i];
+        out.dq[i] += 0.5 * dt * acceleration;
+    }
+    out
 }
 
 /// Moves joint `i` with constant acceleration; one that stops, stops exactly.

@@ -198,7 +198,8 @@ mod tests {
             let dry = Dry { bound: 0.6, creep, presliding };
             let step = |external: &Joints| {
                 let (mut link, mut motor) = (state, state);
-                let passed = arm.step_through(&dry, (&mut link, &mut motor, &mut [0.0; 8]), (&gravity, external), dt);
+                let passed =
+                    arm.step_through(&dry, (&mut link, &mut motor, &mut [0.0; 8]), (&gravity, external), (dt, 1));
                 (link.dq, passed.grip)
             };
             let (alone, grip) = step(&[0.0; 8]);

@@ -39,7 +39,7 @@ pub(in crate::effects) const EFFECT: EffectInfo = EffectInfo {
             format!(
                 "Commands arrive {time} late: send them so much earlier, or shorten their way (a cable instead of a radio link, fewer buffers and processes between planner and robot)."
             ),
-            format!("Hold commands back by {time}, {steps} steps of 1 ms, before the controller gets them."),
+            format!("Add a delay of {time} ({steps} steps of 1 ms) before the controller."),
         )
     },
     model: |found| vec![Change::CommandDelay(found.number("delay"))],

@@ -11,7 +11,7 @@ const LONGEST_STEP: f64 = 2.5e-4;
 /// than so many times that, a period is taken in so many parts. One part leaves 55 sigma² of the torque asked for at a Stribeck
 /// velocity of 14 mrad/s, two leave 5. Beyond, `exp(-25)` of the change is left.
 const SLOW_RATIO: f64 = 5.0;
-const SLOW_PARTS: f64 = 4.0;
+const SLOW_PARTS: usize = 4;
 /// Where it turns round over hundreds of them, one part will do [rad/s].
 const SLOW_AT_MOST: f64 = 0.05;
 /// Bristles bend over a way; this is slow for some mrad [rad/s].
@@ -47,20 +47,14 @@ impl ArmEffects {
             memory.bent = Some([0.0; MAX_JOINTS]);
         }
         let bent = memory.bent.get_or_insert_with(|| self.bent_at(arm, state, torques));
-        let steps = if self.yields() {
-            (dt / LONGEST_STEP - 1e-9).ceil().max(1.0)
+        let parts = if self.yields() {
+            (dt / LONGEST_STEP - 1e-9).ceil().max(1.0) as usize
         } else {
             *motor = *state;
             let slow = |i: usize| state.dq[i].abs() < self.slow(i);
-            if (0..arm.dof()).any(slow) { SLOW_PARTS } else { 1.0 }
+            if (0..arm.dof()).any(slow) { SLOW_PARTS } else { 1 }
         };
-        let mut whole = Passed::default();
-        for _ in 0..steps as usize {
-            let part = arm.step_through(self, (state, motor, bent), torques, dt / steps);
-            whole.grip = part.grip;
-            whole.tau_J = std::array::from_fn(|i| whole.tau_J[i] + part.tau_J[i] / steps);
-        }
-        whole
+        arm.step_through(self, (state, motor, bent), torques, (dt, parts))
     }
 
     /// Below this speed the dry friction of a joint changes within a few periods [rad/s]; 0 where it turns round at once.
