@@ -197,7 +197,7 @@ fn pose_rows(object: &ObjectClips, clip: usize, first: usize) -> Vec<Row> {
             Part::After => (0, StageName::Rest, "after the slide"),
             Part::Hit | Part::Slide if alone => (2, StageName::Slide, "by itself"),
             _ if since < HIT_DURATION => (1, StageName::Hit, "blow"),
-            Part::Hit => (2, StageName::Slide, "beside the tool"),
+            Part::Hit => (2, StageName::Slide, "in contact with the tool"),
             Part::Slide => (2, StageName::Slide, "free"),
         };
         let time = row.stamp_ns.saturating_sub(start_ns) as f64 * 1e-9;

@@ -6,14 +6,11 @@
 //! thousandth, and no engine yields to a contact as another does, so the little by which the contact force is off would bend
 //! them. Their slopes by what the arm feels count as zero (a cut, as in modular inference: Liu, Bayarri and Berger 2009).
 //!
-//! Nor do they say anything about a vertical force. A tip that pushes and does not slip may hold the object down or lift it by up to
-//! its friction; how much, rigid bodies leave open, and two engines differ there by ten and more times the encoders' noise in
-//! strokes whose objects go the same way (`tests/peers/README.md`). So the direction in which a vertical force at the tip turns the joints, `K_P^-1 J_z'`, is taken out.
+//! Nor do they say anything about a [vertical force](super::vertical).
 
 use super::arm::ArmClips;
 use super::object::{self, ObjectClips};
-use super::{Row, StageName};
-use nalgebra::DVector;
+use super::{Row, StageName, vertical};
 use shared_mem::theta::Theta;
 use shared_mem::time::TICK_NS;
 use std::ops::Range;
@@ -65,13 +62,10 @@ impl Contact {
     pub fn in_sigmas(&self, errors: &[f64], stiffness: &[f64]) -> Vec<f64> {
         let dof = self.sigma.len().max(1);
         let at = |(errors, lever): (&[f64], &Joints)| {
-            let errors =
-                DVector::from_iterator(dof, errors.iter().zip(&self.sigma).map(|(error, sigma)| error / sigma));
-            // A joint that no spring holds shows no force by where it stands.
-            let yields = |joint: usize| if stiffness[joint] > 0.0 { lever[joint] / stiffness[joint] } else { 0.0 };
-            let vertical = DVector::from_iterator(dof, (0..dof).map(|joint| yields(joint) / self.sigma[joint]));
-            let share = errors.dot(&vertical) / vertical.norm_squared().max(f64::MIN_POSITIVE);
-            (errors - vertical * share).as_slice().to_vec()
+            let mut errors: Vec<f64> = errors.iter().zip(&self.sigma).map(|(error, sigma)| error / sigma).collect();
+            let vertical = vertical::yields(lever, stiffness).zip(&self.sigma);
+            vertical::take_out(&mut errors, &vertical.map(|(yields, sigma)| yields / sigma).collect::<Vec<_>>());
+            errors
         };
         errors.chunks_exact(dof).zip(&self.levers).flat_map(at).collect()
     }

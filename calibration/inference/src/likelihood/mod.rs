@@ -45,6 +45,7 @@ mod test_servo;
 mod test_setting;
 #[cfg(test)]
 mod test_smoothing;
+mod vertical;
 
 pub use rows::{Channel, Group, Row, StageName};
 pub use setting::{Setting, Settings};

@@ -37,7 +37,7 @@ use super::motion::Mover;
 use super::random_effects::{RandomEffects, WithOwn};
 use super::recent::Recent;
 use super::rows::{Channel, Group, Row};
-use super::{Likelihood, Near};
+use super::{Likelihood, Near, vertical};
 use crate::engine::{Engine, Quantity};
 use crate::estimate::{ClipModel, Impossible, Random};
 use following::Moment;
@@ -238,10 +238,7 @@ impl<F: Fn(&[f64]) -> Theta + Sync> ArmClips<F> {
 
     /// By how much a vertical force of 1 N at the tip turns each joint at measured joints [N m].
     pub fn vertical_lever(&self, measured: &[f64]) -> Joints {
-        let mut q = [0.0; MAX_JOINTS];
-        q[..measured.len()].copy_from_slice(measured);
-        let tip = self.nominal.tip(&q).position();
-        self.nominal.jacobian(&q, tip).map(|column| column[2])
+        vertical::lever(&self.nominal, measured)
     }
 
     /// Largest torque that the controller asks of each joint in any of the clips, gravity included [N m].

@@ -26,7 +26,7 @@ impl Regimes {
         let row = desired.stamps_ns.partition_point(|stamp| *stamp <= stamp_ns).saturating_sub(1);
         let dq = desired.dq_row(row).map_or(0.0, |dq| dq[joint]);
         match dq {
-            _ if dq.abs() < STANDING_SPEED => "standing or turning round",
+            _ if dq.abs() < STANDING_SPEED => "at rest or reversing",
             _ if dq > FAST_SHARE * self.0[joint] => "fast forward",
             _ if dq < -FAST_SHARE * self.0[joint] => "fast backward",
             _ if dq > 0.0 => "slow forward",
@@ -48,9 +48,9 @@ mod tests {
         let at = |stamp_ns| regimes.at(&desired, stamp_ns, 0);
         assert_eq!(
             [at(504), at(510), at(529), at(530), at(600)],
-            ["standing or turning round", "slow forward", "fast forward", "fast backward", "slow backward"]
+            ["at rest or reversing", "slow forward", "fast forward", "fast backward", "slow backward"]
         );
         let bare = JointSeries { dq: Vec::new(), ..desired.clone() };
-        assert_eq!(regimes.at(&bare, 529, 0), "standing or turning round");
+        assert_eq!(regimes.at(&bare, 529, 0), "at rest or reversing");
     }
 }

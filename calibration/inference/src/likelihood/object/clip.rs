@@ -1,11 +1,13 @@
 //! One recorded clip with an object, prepared for being held against the twin: when its object was hit, let go and came
 //! to rest, and where the arm is looked at. Base frame, SI, stamps of the recording.
 
+use super::super::vertical;
 use super::clearance::Clearance;
 use nalgebra::Vector3;
 use shared_mem::cell::Cell;
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::recording::{Clip, ObjectSeries};
+use twin::arm::{ArmModel, Joints};
 use twin::control::CommandTrack;
 use twin::effects::CameraEffects;
 
@@ -35,11 +37,13 @@ pub(super) struct ObjectClip {
     /// Measured rows of the arm that count.
     pub(super) arm_rows: Vec<usize>,
     pub(super) arm_ns: Vec<u64>,
+    /// Of each of these by how much a vertical force of 1 N at the tip turns each joint [N m]; empty without an arm.
+    pub(super) levers: Vec<Joints>,
 }
 
 impl ObjectClip {
     /// `None` when no pose was recorded. `noise`: one sigma of a coordinate [m].
-    pub(super) fn new(recorded: Clip, cell: &Cell, noise: f64) -> Option<Self> {
+    pub(super) fn new(recorded: Clip, (cell, arm): (&Cell, Option<&ArmModel>), noise: f64) -> Option<Self> {
         let ObjectSeries { stamps_ns, poses } = &recorded.object;
         let (end_ns, first, last) = (*stamps_ns.last()?, place(poses.first()?), place(poses.last()?));
         let away =
@@ -59,7 +63,9 @@ impl ObjectClip {
             }
         }
         let commands = CommandTrack::of_cell(&recorded.desired, cell);
-        Some(Self { recorded, commands, onset_ns, free_ns, rest_ns, end_ns, arm_rows, arm_ns })
+        let lever = |row: &usize| Some(vertical::lever(arm?, recorded.measured.q_row(*row)));
+        let levers = arm_rows.iter().filter_map(lever).collect();
+        Some(Self { recorded, commands, onset_ns, free_ns, rest_ns, end_ns, arm_rows, arm_ns, levers })
     }
 
     /// The poses as they were, under effects that report them elsewhere.

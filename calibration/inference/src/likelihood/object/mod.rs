@@ -35,8 +35,8 @@ pub use nuisance::{IDENTIFIED, Nuisance, diagnosed, random_effects};
 pub use replayed::Replays;
 pub use rows::{Channel, Part, Row};
 
-use super::Settings;
 use super::random_effects::RandomEffects;
+use super::{Settings, vertical};
 use crate::engine::Engine;
 use crate::estimate::{ClipModel, Impossible};
 use cache::ClipCache;
@@ -120,12 +120,12 @@ impl ObjectClips {
     /// [`SimError`] when the cell cannot be simulated.
     pub fn new(cell: &Cell, clips: Vec<Clip>, settings: Settings) -> Result<Self, SimError> {
         let noise = noise_of(cell);
-        let prepared = |clip| ObjectClip::new(clip, cell, noise.position);
+        let worker = CellRollout::new(cell, None)?;
+        let prepared = |clip| ObjectClip::new(clip, (cell, worker.cell().arm_model()), noise.position);
         let clips: Vec<ObjectClip> = clips.into_iter().filter_map(prepared).collect();
         let acts = |own: &Nuisance| clips.iter().any(|clip| own.acts_in(clip.recorded.kind));
         let nuisance = IDENTIFIED.iter().copied().filter(acts).collect();
         let [caches, simulated] = [(), ()].map(|()| clips.iter().map(|_| ClipCache::default()).collect());
-        let worker = CellRollout::new(cell, None)?;
         let (error, workers) = (ModelError::default(), Mutex::default());
         let (cell, simulator) = (cell.clone(), None);
         Ok(Self { cell, noise, error, clips, nuisance, caches, simulator, simulated, workers, worker, settings })
@@ -252,7 +252,7 @@ impl ObjectClips {
     /// [`Impossible`] when the cell cannot be simulated with these numbers.
     pub fn errors(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
         let own = self.values(clip, own);
-        self.errors_of(clip, &*self.outcome(clip, shared, &own)?, &own)
+        self.errors_of(clip, shared, (&*self.outcome(clip, shared, &own)?, &own))
     }
 
     /// The same by the twin, whoever simulates: for what a step changes.
@@ -261,17 +261,26 @@ impl ObjectClips {
     /// As [`Self::errors`].
     pub fn twins_errors(&self, clip: usize, shared: &[f64], own: &[f64]) -> Result<Vec<f64>, Impossible> {
         let own = self.values(clip, own);
-        self.errors_of(clip, &*self.by_twin(clip, &self.settings.theta(shared), &own)?, &own)
+        self.errors_of(clip, shared, (&*self.by_twin(clip, &self.settings.theta(shared), &own)?, &own))
     }
 
-    fn errors_of(&self, clip: usize, outcome: &Outcome, own: &Values) -> Result<Vec<f64>, Impossible> {
+    fn errors_of(
+        &self,
+        clip: usize,
+        shared: &[f64],
+        (outcome, own): (&Outcome, &Values),
+    ) -> Result<Vec<f64>, Impossible> {
         let clip = &self.clips[clip];
         let poses = clip.recorded.object.poses.iter().zip(reported(outcome, clip, own));
         let mut errors: Vec<f64> = poses.flat_map(|(a, b)| difference(&a.isometry(), &b.isometry())).collect();
         if self.error.joints.is_some() {
-            let measured = &clip.recorded.measured;
-            for (row, predicted) in clip.arm_rows.iter().zip(&outcome.joints) {
+            let (measured, gains) = (&clip.recorded.measured, self.settings.theta(shared).arm);
+            let stiffness = gains.as_ref().map_or(&[][..], |gains| &gains.stiffness);
+            for ((row, predicted), lever) in clip.arm_rows.iter().zip(&outcome.joints).zip(&clip.levers) {
+                let first = errors.len();
                 errors.extend(measured.q_row(*row).iter().zip(predicted).map(|(q, predicted)| q - predicted));
+                let vertical: Vec<f64> = vertical::yields(lever, stiffness).collect();
+                vertical::take_out(&mut errors[first..], &vertical);
             }
         }
         if errors.iter().all(|error| error.is_finite()) {
