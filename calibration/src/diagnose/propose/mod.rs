@@ -14,14 +14,16 @@ pub mod screening;
 pub mod signatures;
 pub mod starts;
 
+use crate::diagnose::criteria::JOINTS_EXCESS;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::effort::{Effort, REFINEMENT};
 use crate::diagnose::fit::multi_start::{MultiStart, Tried};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
 use inference::admit::Split;
-use inference::likelihood::{Evidence, Likelihood};
+use inference::likelihood::{Evidence, Group, Likelihood};
 use inference::witness::Witness;
+use shared_mem::msg::MAX_JOINTS;
 use shared_mem::progress::Progress;
 
 /// What every step of a search for effects is given.
@@ -103,6 +105,28 @@ impl<E: Likelihood> Around<'_, E> {
         self.bench.plain_cost(&self.from.clips(), full, self.weights).unwrap_or(f64::INFINITY)
     }
 
+    /// Joints in whose own channels the hypothesis leaves more than sessions with nothing wrong do.
+    fn joints_with_a_gap(&self) -> Vec<usize> {
+        let evidence = self.bench.evidence;
+        let (mut squares, mut rows) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS]);
+        for (clip, own) in self.from.clips_with_own() {
+            let mut residuals = Vec::new();
+            if evidence.residuals(clip, &self.from.full, &own, &mut residuals).is_err() {
+                return (0..MAX_JOINTS).collect();
+            }
+            for (row, residual) in evidence.rows(clip).iter().zip(&residuals) {
+                let channel = &evidence.channels()[row.channel];
+                let joint = channel.joint.filter(|_| channel.group == Group::Arm);
+                joint.into_iter().for_each(|joint| {
+                    squares[joint] += residual * residual;
+                    rows[joint] += 1.0;
+                });
+            }
+        }
+        let has_a_gap = |joint: &usize| squares[*joint] > (1.0 + JOINTS_EXCESS.value) * rows[*joint];
+        (0..MAX_JOINTS).filter(has_a_gap).collect()
+    }
+
     /// Which numbers make the clips cost least, and how much, where that is less than `bound`. Of numbers that cost more
     /// before all clips were asked the others are not.
     fn cheapest(&self, numbers: impl IntoIterator<Item = Vec<f64>>, bound: f64) -> Option<Tried> {
@@ -115,6 +139,18 @@ impl<E: Likelihood> Around<'_, E> {
             if let Some(cost) = self.bench.plain_cost_below(&clips, &numbers, self.weights, bound) {
                 best = Some(Tried { cost, numbers });
             }
+        }
+        best
+    }
+
+    /// The same of several, the cheapest first.
+    fn several_cheapest(&self, numbers: impl IntoIterator<Item = Vec<f64>>, count: usize) -> Vec<Tried> {
+        let mut best: Vec<Tried> = Vec::new();
+        for numbers in numbers {
+            let bound = if best.len() < count { f64::INFINITY } else { best[count - 1].cost };
+            best.extend(self.cheapest([numbers], bound));
+            best.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+            best.truncate(count);
         }
         best
     }

@@ -67,14 +67,19 @@ fn pointed_at<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64
     let uneven = matches!(candidate.effect.stage, Stage::Hit | Stage::Camera);
     // What an object pivots about changes the hit, of which slopes tell little, and its number decides how it spins besides.
     if (uneven && !one_probe) || candidate.is_searched(Search::NonSmooth) {
-        numbers.extend(each_direction(at, scored));
+        numbers.extend(each_direction(at, scored, if has_many_minima(candidate) { MAX_FORMS } else { 1 }));
     }
     numbers
 }
 
 /// Whether a candidate's forms are places on the table.
-pub(in crate::diagnose) fn has_places(candidate: &Candidate) -> bool {
+fn has_places(candidate: &Candidate) -> bool {
     candidate.alternatives.len() > MAX_FORMS && candidate.effect.stage == Stage::Slide
+}
+
+/// Whether what lies in the right place may come down later than what stands in for it elsewhere.
+pub(in crate::diagnose) fn has_many_minima(candidate: &Candidate) -> bool {
+    has_places(candidate) || candidate.is_searched(Search::NonSmooth)
 }
 
 /// Where the clips cost least with a candidate in each of its many forms, friction being another beside it: an edge that lies
@@ -140,11 +145,15 @@ fn first_moves(candidate: &Candidate) -> impl Iterator<Item = (usize, f64)> {
 }
 
 /// Sizes of an effect in the joints, one joint after the other, where the clips cost least once the gains of that joint are fitted
-/// beside it: gains that were fitted without the effect stand in for it.
+/// beside it: gains that were fitted without the effect stand in for it. In joints that leave no gap it explains nothing.
 fn joint_by_joint<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate) -> Vec<f64> {
     let (library, mut full) = (at.bench.library, at.from.full.clone());
+    let open = at.joints_with_a_gap();
     for probe in &candidate.alternatives[0].probes {
         let Some(&one) = probe.moves.first() else { continue };
+        if library.joints[one.0].is_some_and(|joint| !open.contains(&joint)) {
+            continue;
+        }
         let beside = library.baseline.clone().filter(|k| library.joints[*k] == library.joints[one.0]);
         let chosen: Vec<usize> = beside.chain([one.0]).collect();
         let tried = IN_EACH_JOINT.iter().filter_map(|share| {
@@ -166,10 +175,10 @@ fn with_nominal<E: Likelihood>(at: &Around<'_, E>, which: impl Fn(usize) -> bool
     full
 }
 
-/// Some way to either side along each of a candidate's directions, in any of its forms: what the clips cost where they cost
-/// least, and the numbers there. Also with the object as it is said to be: fitted without the effect, its numbers stand in
+/// Some way to either side along each of a candidate's directions, in any of its forms: the numbers of those `count` places where the
+/// clips cost least. Also with the object as it is said to be: fitted without the effect, its numbers stand in
 /// for it, and would have to be unlearnt. But for its friction: how far it slides tells that whatever the hit was like.
-fn each_direction<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Option<Vec<f64>> {
+fn each_direction<E: Likelihood>(at: &Around<'_, E>, scored: &Scored, count: usize) -> Vec<Vec<f64>> {
     let alternatives = &at.candidate(scored).alternatives;
     let mut starts = Vec::new();
     for (alternative, form) in alternatives.iter().enumerate() {
@@ -185,7 +194,7 @@ fn each_direction<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Option<
     let of_object = |k| !library.arm_feels(k, &at.from.full) && library.settings.settings()[k] != Setting::Friction;
     let bases = [at.from.full.clone(), with_nominal(at, of_object)];
     let numbers = starts.iter().flat_map(|start| bases.iter().map(|base| at.bench.begun(base.clone(), start)));
-    at.cheapest(numbers, f64::INFINITY).map(|best| best.numbers)
+    at.several_cheapest(numbers, count).into_iter().map(|one| one.numbers).collect()
 }
 
 /// Numbers of an effect in the joints that the arm's own channels leave open, where the object tells them: nothing but what

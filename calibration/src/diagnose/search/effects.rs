@@ -234,10 +234,10 @@ fn a_little<E: Evidence>(search: &Search<'_, E>, step: &Step, place: usize, over
     let fits = search.fits(&effects, &step.weights, &step.from);
     let starts = starts::kept(&Around { bench, from: &step.from, weights: &step.weights }, scored, overlooked);
     let effort = bench.trying(scored.candidate, SCREENING);
-    if !starts::has_places(&bench.library.candidates[scored.candidate]) {
+    if !starts::has_many_minima(&bench.library.candidates[scored.candidate]) {
         return fits.best(starts, effort);
     }
-    // What lies in the right place may come down later than what stands in for it elsewhere: one look at all, and several to the end.
+    // One look at all, and several to the end.
     fits.best_further(
         starts,
         bench.trying(scored.candidate, PROBE),
