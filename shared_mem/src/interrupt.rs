@@ -132,7 +132,7 @@ impl Interrupt {
             Last::Prepared(farewell) => farewell(),
         };
         output::discard_unfinished();
-        console::line(format_args!("calibration: {words}"));
+        console::line(words);
         console::flush();
         std::process::exit(1);
     }

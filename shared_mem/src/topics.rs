@@ -74,9 +74,10 @@ const fn topic<M: Message>(name: &'static str, limits: Limits) -> Topic<M> {
 pub const ARM_STATE: Topic<ArmState> = topic("/arm/state", STREAM);
 /// Bridge to all: what the arm was told, each cycle.
 pub const ARM_COMMAND: Topic<ArmCommand> = topic("/arm/command", STREAM);
-/// Capture to bridge: motions to play. Two writers, so that a second sender is refused by the bridge and not by the transport.
+/// Capture to bridge: motions to play. Several writers, so that a second sender is refused by the bridge and not by the transport,
+/// and a stop has a place beside both.
 pub const ARM_MOTION: Topic<MotionChunk> =
-    topic("/arm/motion", Limits { buffer: 64, history: 0, borrowed: 2, subscribers: 4, publishers: 2 });
+    topic("/arm/motion", Limits { buffer: 64, history: 0, borrowed: 2, subscribers: 4, publishers: 4 });
 /// Anyone to bridge: where the arm is to go now. Several writers, so that a second sender is refused by the bridge and not by
 /// the transport.
 pub const ARM_TARGET: Topic<ArmTarget> = topic("/arm/target", TARGETS);

@@ -3,9 +3,11 @@
 //! An absent block means "not known" or "not there"; unknown keys are refused with the nearest known name.
 
 mod background;
+mod built_in;
 mod camera;
 mod controller;
 mod gripper;
+mod moved;
 mod object;
 mod objects;
 mod ranges;
@@ -151,13 +153,23 @@ pub enum CellError {
 }
 
 impl Cell {
-    /// Reads and checks a cell.toml.
+    /// Reads and checks a cell.toml. `fr3` is the cell that ships with the project, unless there is a file of that name.
     ///
     /// # Errors
     /// [`CellError`] with file, key and remedy.
     pub fn read(path: &Path) -> Result<Self, CellError> {
-        let text = input::text(path, input::Kind::Configuration).map_err(TomlFileError::from)?;
-        Self::parse(&text, path)
+        Self::parse(&Self::text(path)?, path)
+    }
+
+    /// The text of a cell.toml, or of the cell that is built in.
+    ///
+    /// # Errors
+    /// [`CellError`] where it cannot be read.
+    pub fn text(path: &Path) -> Result<String, CellError> {
+        match built_in::text(path) {
+            Some(text) => Ok(text.to_owned()),
+            None => Ok(input::text(path, input::Kind::Configuration).map_err(TomlFileError::from)?),
+        }
     }
 
     /// The same from text, as it rides along with a recording; `path` names it in errors, and relative paths in it

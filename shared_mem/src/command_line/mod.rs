@@ -85,6 +85,15 @@ pub fn parse<A: Parser>(build: &Build) -> Result<A, ExitCode> {
     }
 }
 
+/// A whole program: reads its command line and does what that says. What was said last is out when it ends.
+pub fn program<A: Parser>(build: &Build, run: impl FnOnce(A) -> ExitCode) -> ExitCode {
+    let _last_lines = console::start();
+    match parse(build) {
+        Ok(arguments) => run(arguments),
+        Err(code) => code,
+    }
+}
+
 const COMPLETIONS: &str = "completions";
 const MANPAGES: &str = "manpages";
 
