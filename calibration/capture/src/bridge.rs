@@ -54,6 +54,8 @@ pub struct Wanted<'a> {
     pub arm: Option<&'a str>,
     /// How a simulated arm holds the simulated camera; default: it stands where cell.toml says.
     pub hand_eye: Option<&'a Path>,
+    /// Whether it goes without a camera; else with the one that is usual for its arm.
+    pub no_camera: bool,
     /// Whether it insists on real time; default: its own.
     pub realtime: Option<&'a str>,
     /// Shared-memory domain; default: the one this process was started in.
@@ -120,6 +122,7 @@ impl Bridge {
         let mut list = arguments([&"run", &"--cell", &wanted.cell, &"--arm", &arm]);
         let held = wanted.hand_eye.filter(|_| arm == SIMULATED);
         list.extend(held.into_iter().flat_map(|file| arguments([&"--hand-eye", &file])));
+        list.extend(wanted.no_camera.then(|| arguments([&"--camera", &"off"])).into_iter().flatten());
         list.extend(wanted.realtime.into_iter().flat_map(|way| arguments([&"--realtime", &way])));
         Running::start(Program::Bridge, &list, wanted.domain)
     }

@@ -76,7 +76,7 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let kind = (ClipKind::ControlHitSlide, cell.object_name());
     let repeats = task.repeat.iter().map(|number| recorded::read(&task.out, *number, kind, &body));
     let repeats = repeats.collect::<Result<Vec<_>, _>>()?;
-    let session = Session::open(&task.out, &cell)?;
+    let session = Session::open(&task.out, &cell, &task.cell)?;
     let mut link = Link::open(domain)?;
     let mut object = ObjectWatch::open(domain, &cell)?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
@@ -333,7 +333,7 @@ impl<'a> CaptureContext<'a> {
         let (_, file) = self.session.next_clip()?;
         let path = self.session.folder().join(&file);
         let task = &self.options.task;
-        let recorder = Recorder::start(&path, &task.cell, task.domain.as_deref(), self.interrupt)?;
+        let recorder = Recorder::start(&path, task.recording(), self.interrupt)?;
         object.begin();
         link.announce(&format!("{}: {motion}", file.display()))?;
         let (outcome, quality) = self.play(link, object, points, &format!("{title}: stroke")).inspect_err(|_| {

@@ -87,7 +87,7 @@ pub fn capture(
     let repeats =
         task.repeat.iter().map(|number| recorded::read(&task.out, *number, (ClipKind::Excitation, None), &body));
     let repeats = repeats.collect::<Result<Vec<_>, _>>()?;
-    let session = Session::open(&task.out, &cell)?;
+    let session = Session::open(&task.out, &cell, &task.cell)?;
     let mut link = Link::open(task.domain.as_deref())?;
     let mut bridge = task.bridge(&mut link, interrupt)?;
     let (limits, floor, recovery) = (limits::of(&cell, &body), floor(&cell)?, Recovery::new(options.task.recover));
@@ -161,7 +161,7 @@ impl CaptureContext<'_> {
         let motion = self.words(count);
         let path = self.session.folder().join(&file);
         let task = &self.options.task;
-        let recorder = Recorder::start(&path, &task.cell, task.domain.as_deref(), self.interrupt)?;
+        let recorder = Recorder::start(&path, task.recording(), self.interrupt)?;
         if self.interrupt.halted() {
             recorder.finish()?;
             return Ok(None);

@@ -79,10 +79,16 @@ impl Placing<'_> {
         self.simulated.start_object_at(wanted.place, wanted.yaw.sin().atan2(wanted.yaw.cos()));
         let file = self.cell_file();
         output::write(&file, self.simulated.to_toml())?;
-        console::line(format_args!("the simulated cell is started anew with the object at {}", words(wanted)));
-        let Task { realtime, domain, .. } = self.task;
-        let wanted =
-            Wanted { cell: &file, arm: None, hand_eye: None, realtime: realtime.as_deref(), domain: domain.as_deref() };
+        console::line(format_args!("restarting the simulation with the object at {}", words(wanted)));
+        let Task { realtime, domain, no_camera, .. } = self.task;
+        let wanted = Wanted {
+            cell: &file,
+            arm: None,
+            hand_eye: None,
+            no_camera: *no_camera,
+            realtime: realtime.as_deref(),
+            domain: domain.as_deref(),
+        };
         let started = self.bridge.simulate_anew(link, &wanted, self.interrupt);
         object.begin_anew()?;
         let removed = std::fs::remove_file(&file);

@@ -23,6 +23,8 @@ const KEPT_STDERR_LINES: usize = 8;
 const LONGEST_ANSWER: u64 = 256 << 20;
 /// How long a child may take to end after SIGTERM before it is killed.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(5);
+/// The program that holds the verbs of all.
+const ALL_VERBS: &str = "twinalign";
 /// How often a child is looked at while it ends.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
@@ -86,7 +88,7 @@ impl Program {
         }
     }
 
-    /// The binary: beside this one, else on the PATH. Of a test, which cargo builds into `deps`, beside that folder too.
+    /// The binary, or else the one that holds the verbs of all programs: beside this one, else on the PATH. Of a test, which cargo builds into `deps`, beside that folder too.
     ///
     /// # Errors
     /// [`ProcessError::Missing`], which says how to build it.
@@ -97,10 +99,10 @@ impl Program {
         let beside = folder.into_iter().chain(of_test).map(PathBuf::from);
         let path = std::env::var_os("PATH").unwrap_or_default();
         let on_path: Vec<PathBuf> = std::env::split_paths(&path).collect();
-        beside
-            .chain(on_path)
-            .map(|folder| folder.join(self.name()))
-            .find(|file| file.is_file())
+        let folders: Vec<PathBuf> = beside.chain(on_path).collect();
+        let file = |name: &str| folders.iter().map(|folder| folder.join(name)).find(|file| file.is_file());
+        file(self.name())
+            .or_else(|| file(ALL_VERBS))
             .ok_or(ProcessError::Missing { name: self.name(), package: self.name() })
     }
 }

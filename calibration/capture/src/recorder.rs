@@ -30,6 +30,17 @@ pub enum RecordError {
     },
 }
 
+/// What is recorded.
+#[derive(Debug, Clone, Copy)]
+pub struct Recording<'a> {
+    /// Rides along.
+    pub cell: &'a Path,
+    /// Shared-memory domain; default: the one this process was started in.
+    pub domain: Option<&'a str>,
+    /// Whether pictures are left out.
+    pub no_camera: bool,
+}
+
 /// A recording that runs.
 #[derive(Debug)]
 pub struct Recorder {
@@ -49,13 +60,14 @@ pub struct Recorded {
 }
 
 impl Recorder {
-    /// Starts recording `domain` into `clip` and waits until the file is open.
+    /// Starts recording into `clip` and waits until the file is open.
     ///
     /// # Errors
     /// [`RecordError`] when the recorder cannot be started or opens no file.
-    pub fn start(clip: &Path, cell: &Path, domain: Option<&str>, interrupt: &Interrupt) -> Result<Self, RecordError> {
-        let list = arguments([&"record", &"--json", &"--out", &clip, &"--cell", &cell]);
-        let mut running = Running::start(Program::Bridge, &list, domain)?;
+    pub fn start(clip: &Path, recording: Recording<'_>, interrupt: &Interrupt) -> Result<Self, RecordError> {
+        let mut list = arguments([&"record", &"--json", &"--out", &clip, &"--cell", &recording.cell]);
+        list.extend(recording.no_camera.then(|| "--no-camera".into()));
+        let mut running = Running::start(Program::Bridge, &list, recording.domain)?;
         let start = Instant::now();
         while !clip.exists() && !interrupt.asked() {
             running.check()?;

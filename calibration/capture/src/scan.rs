@@ -65,7 +65,7 @@ pub struct Summary {
     pub pictures: usize,
     /// Of these with depth.
     pub with_depth: usize,
-    /// Of these with a mask.
+    /// Of these with an object in their mask.
     pub with_mask: usize,
     /// Views within reach of which no way inside every limit was found.
     pub without_way: usize,
@@ -81,6 +81,8 @@ pub struct Summary {
 const MIN_VIEWS: usize = 8;
 /// Flange, tool and camera stay this far above the table [m].
 const CLEARANCE: f64 = 0.05;
+/// A mask with less of the picture is none [share]: 300 pixels of 640 x 480 are an object of 10 mm half a metre away.
+const MIN_MASK: f64 = 1e-3;
 /// From the middle of a pixel to the corner that lists of pictures count from.
 const PIXEL_CORNER_OFFSET: f64 = 0.5;
 
@@ -125,7 +127,7 @@ pub fn capture(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Summa
     let mut link = Link::open(options.domain.as_deref())?;
     let (arm, realtime) = (options.arm.as_deref(), options.realtime.as_deref());
     let (hand_eye_file, domain) = (Some(options.hand_eye.as_path()), options.domain.as_deref());
-    let wanted = Wanted { cell: &options.cell, arm, hand_eye: hand_eye_file, realtime, domain };
+    let wanted = Wanted { cell: &options.cell, arm, hand_eye: hand_eye_file, no_camera: false, realtime, domain };
     let mut bridge = Bridge::find_or_start(&mut link, &wanted, &Admission::default(), interrupt)?;
     let shots = Shots::open(options.domain.as_deref(), latency)?;
     let limits = limits::of(&cell, &body);
@@ -217,10 +219,15 @@ impl CaptureContext<'_> {
             open.swap_remove(next);
             match self.shots.take(link, self.interrupt) {
                 Ok(shot) => {
-                    self.keep(summary.pictures, &shot)?;
+                    let mask = self.keep(summary.pictures, &shot)?;
                     summary.pictures += 1;
                     summary.with_depth += usize::from(shot.depth.is_some());
-                    summary.with_mask += usize::from(shot.depth.is_some() && self.cut.is_some());
+                    summary.with_mask += usize::from(mask.is_some_and(|share| share > MIN_MASK));
+                    ensure!(
+                        summary.pictures > 1 || mask.is_none_or(|share| share > MIN_MASK),
+                        "the first picture has no object in its mask: above the table nothing was measured within {radius:.2} m of --at; \
+                         put it there, and further from the camera than that measures (a D455: 0.4 m), then start again with a new folder"
+                    );
                 }
                 Err(ShotError::Interrupted) => break,
                 Err(error) => return Err(error.into()),
@@ -266,8 +273,10 @@ impl CaptureContext<'_> {
         Ok(Outcome::Done)
     }
 
-    /// Writes the pictures, then the list with them in it: what it names is there.
-    fn keep(&mut self, number: usize, shot: &Shot) -> anyhow::Result<()> {
+    /// Writes the pictures, then the list with them in it: what it names is there. The share of the picture that its mask covers, where
+    /// there is one.
+    fn keep(&mut self, number: usize, shot: &Shot) -> anyhow::Result<Option<f64>> {
+        let mut covered = None;
         let name = format!("{number:03}.png");
         write(&self.options.out.join("images").join(&name), &shot.colour)?;
         let mut frame = json!({ "file_path": format!("images/{name}"), "O_T_EE": shot.state.O_T_EE });
@@ -278,6 +287,8 @@ impl CaptureContext<'_> {
             if let Some(cut) = &self.cut {
                 let flange = Matrix::Flat(shot.state.O_T_EE).isometry().map_err(anyhow::Error::msg)?;
                 let mask = cut.mask(depth, &(flange * self.mount));
+                let white = mask.bytes.iter().filter(|value| **value > 0).count();
+                covered = Some(white as f64 / mask.bytes.len().max(1) as f64);
                 write(&self.options.out.join("masks").join(&name), &mask)?;
             }
         }
@@ -286,7 +297,8 @@ impl CaptureContext<'_> {
             frames.push(frame);
         }
         let text = serde_json::to_string_pretty(&self.list)?;
-        Ok(output::write(&self.options.out.join("poses.json"), text)?)
+        output::write(&self.options.out.join("poses.json"), text)?;
+        Ok(covered)
     }
 }
 

@@ -45,12 +45,13 @@ pub enum SessionError {
 }
 
 impl Session {
-    /// Opens `folder`, or creates it with a copy of `cell` without clips.
+    /// Opens `folder`, or creates it with a copy of `cell` without clips: with the comments of the file `from` which that was read.
     ///
     /// # Errors
     /// [`SessionError`] when it cannot be written, or belongs to another cell.
-    pub fn open(folder: &Path, cell: &Cell) -> Result<Self, SessionError> {
+    pub fn open(folder: &Path, cell: &Cell, from: &Path) -> Result<Self, SessionError> {
         let session = Self { folder: folder.to_owned(), new: !folder.exists() };
+        let text = Cell::text(from).ok().and_then(|text| cell.text_elsewhere(&text));
         let cell = cell.at_home_anywhere();
         if session.cell_file().exists() {
             let known = Cell::read(&session.cell_file())?.at_home_anywhere();
@@ -60,7 +61,7 @@ impl Session {
             };
         }
         std::fs::create_dir_all(folder).map_err(|source| SessionError::Write { path: folder.to_owned(), source })?;
-        session.write(&Cell { clips: Vec::new(), ..cell }.to_toml())?;
+        session.write(&text.unwrap_or_else(|| Cell { clips: Vec::new(), ..cell }.to_toml()))?;
         Ok(session)
     }
 
@@ -154,10 +155,10 @@ mod tests {
     fn clips_are_numbered_on_and_each_is_entered_once() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("session");
-        let session = Session::open(&path, &cell()).expect("a new session");
+        let session = Session::open(&path, &cell(), Path::new("no_file")).expect("a new session");
         assert_eq!(session.next_clip().expect("a name"), (0, "clip_00.mcap".into()));
         session.enter(Path::new("clip_00.mcap"), ClipKind::Excitation).expect("entered");
-        let again = Session::open(&path, &cell()).expect("the same session");
+        let again = Session::open(&path, &cell(), Path::new("no_file")).expect("the same session");
         assert_eq!(again.next_clip().expect("a name"), (1, "clip_01.mcap".into()));
         again.enter(Path::new("clip_01.mcap"), ClipKind::ControlHitSlide).expect("entered");
         let read = Cell::read(&again.cell_file()).expect("a valid cell.toml");
@@ -170,7 +171,7 @@ mod tests {
     #[test]
     fn a_clip_left_by_an_aborted_capture_is_not_overwritten() {
         let folder = tempfile::tempdir().expect("a folder");
-        let session = Session::open(folder.path(), &cell()).expect("a session");
+        let session = Session::open(folder.path(), &cell(), Path::new("no_file")).expect("a session");
         std::fs::write(folder.path().join("clip_04.mcap"), "half a clip").expect("a file");
         assert_eq!(session.next_clip().expect("a name").1, PathBuf::from("clip_05.mcap"));
     }
@@ -179,15 +180,15 @@ mod tests {
     fn a_capture_that_failed_before_its_first_clip_leaves_no_folder() {
         let base = tempfile::tempdir().expect("a folder");
         let folder = base.path().join("session");
-        drop(Session::open(&folder, &cell()).expect("a session"));
+        drop(Session::open(&folder, &cell(), Path::new("no_file")).expect("a session"));
         assert!(!folder.exists());
-        let session = Session::open(&folder, &cell()).expect("a session");
+        let session = Session::open(&folder, &cell(), Path::new("no_file")).expect("a session");
         std::fs::write(folder.join("clip_00.mcap"), "half a clip").expect("a file");
         drop(session);
         assert!(folder.join("cell.toml").exists() && folder.join("clip_00.mcap").exists());
         // It was there before this capture.
         std::fs::remove_file(folder.join("clip_00.mcap")).expect("removed");
-        drop(Session::open(&folder, &cell()).expect("a session"));
+        drop(Session::open(&folder, &cell(), Path::new("no_file")).expect("a session"));
         assert!(folder.join("cell.toml").exists());
     }
 
@@ -196,18 +197,29 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let text = "# our best cell\n[robot]\nmodel = \"fr3\"\n[table]\nheight = 0.0\n";
         std::fs::write(folder.path().join("cell.toml"), text).expect("a file");
-        let session = Session::open(folder.path(), &cell()).expect("the session");
+        let session = Session::open(folder.path(), &cell(), Path::new("no_file")).expect("the session");
         session.enter(Path::new("clip_00.mcap"), ClipKind::Excitation).expect("entered");
         let after = std::fs::read_to_string(session.cell_file()).expect("text");
         assert!(after.starts_with(text) && after.contains("[[clip]]"), "{after}");
     }
 
     #[test]
+    fn comments_of_the_laboratorys_file_come_along() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("lab.toml");
+        let text = "# our best cell\n[robot]\nmodel = \"fr3\"\n[table]\nheight = 0.0 # measured\n";
+        std::fs::write(&file, text).expect("a file");
+        let session = folder.path().join("session");
+        let session = Session::open(&session, &Cell::read(&file).expect("a cell"), &file).expect("a session");
+        assert_eq!(std::fs::read_to_string(session.cell_file()).expect("text"), text);
+    }
+
+    #[test]
     fn a_session_of_another_cell_is_refused_by_block() {
         let folder = tempfile::tempdir().expect("a folder");
-        Session::open(folder.path(), &cell()).expect("a session");
+        Session::open(folder.path(), &cell(), Path::new("no_file")).expect("a session");
         let other = Cell { table: Some(Table { height: 0.1 }), ..cell() };
-        let error = Session::open(folder.path(), &other).unwrap_err().to_string();
+        let error = Session::open(folder.path(), &other, Path::new("no_file")).unwrap_err().to_string();
         assert!(error.contains("[table]") && error.contains("--out"), "{error}");
     }
 
@@ -216,9 +228,9 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let robot = Robot { urdf: Some("arm.urdf".into()), ..Robot::default() };
         let lab = Cell { robot: Some(robot), folder: "/lab".into(), ..Cell::default() };
-        let session = Session::open(folder.path(), &lab).expect("a session");
+        let session = Session::open(folder.path(), &lab, Path::new("no_file")).expect("a session");
         let read = Cell::read(&session.cell_file()).expect("a valid cell.toml");
         assert_eq!(read.robot.and_then(|r| r.urdf), Some("/lab/arm.urdf".into()));
-        Session::open(folder.path(), &lab).expect("still the same cell");
+        Session::open(folder.path(), &lab, Path::new("no_file")).expect("still the same cell");
     }
 }

@@ -3,6 +3,7 @@
 use super::admission::Admission;
 use super::bridge::{Bridge, BridgeError, Wanted};
 use super::link::Link;
+use super::recorder::Recording;
 use serde::Serialize;
 use shared_mem::interrupt::Interrupt;
 use shared_mem::origin::Origin;
@@ -26,6 +27,8 @@ pub struct Task {
     pub arm: Option<String>,
     /// Whether that bridge insists on real time, as `rt_bridge run --realtime` takes it; default: the bridge's own.
     pub realtime: Option<String>,
+    /// Whether clips go without pictures, and a bridge that is started without a camera.
+    pub no_camera: bool,
     /// How often a robot that stops itself is recovered without a person.
     pub recover: u32,
     /// Shared-memory domain; default: the one this process was started in.
@@ -67,13 +70,18 @@ impl Task {
         if self.speed == 1.0 { String::new() } else { format!(" at {} times the speed", self.speed) }
     }
 
+    /// How its clips are recorded.
+    pub fn recording(&self) -> Recording<'_> {
+        Recording { cell: &self.cell, domain: self.domain.as_deref(), no_camera: self.no_camera }
+    }
+
     /// The bridge that runs, or one that is started for this task.
     ///
     /// # Errors
     /// [`BridgeError`] with the remedy.
     pub fn bridge(&self, link: &mut Link, interrupt: &Interrupt) -> Result<Bridge, BridgeError> {
         let (arm, realtime, domain) = (self.arm.as_deref(), self.realtime.as_deref(), self.domain.as_deref());
-        let wanted = Wanted { cell: &self.cell, arm, hand_eye: None, realtime, domain };
+        let wanted = Wanted { cell: &self.cell, arm, hand_eye: None, no_camera: self.no_camera, realtime, domain };
         Bridge::find_or_start(link, &wanted, &Admission::to(&self.out, self.mix), interrupt)
     }
 }

@@ -19,10 +19,10 @@ use twin::description::shown_robot;
 /// before it. Where nothing is sent within --wait it ends with exit code 1 and leaves no file.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
-    rt_bridge record --cell config/fr3_cell.toml --out clip.mcap --duration 10 --json\n\n\
+    rt_bridge record --cell fr3 --out clip.mcap --duration 10 --json\n\n\
     JSON: file, messages, bytes, lost (messages overwritten before they could be written), stopped (null, or why it\n\
     ended early).")]
-pub(super) struct RecordArguments {
+pub struct RecordArguments {
     /// The new file
     #[arg(long, value_name = "CLIP.mcap")]
     out: PathBuf,
@@ -32,6 +32,9 @@ pub(super) struct RecordArguments {
     /// Rides along in the file, so that the clip explains itself and viewers show the robot
     #[arg(long, value_name = "cell.toml")]
     cell: Option<PathBuf>,
+    /// Leaves the camera's pictures out
+    #[arg(long)]
+    no_camera: bool,
     /// How long to wait for the first message [s]
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "30")]
     wait: Duration,
@@ -71,7 +74,7 @@ impl RecordArguments {
                 None
             }
         });
-        let settings = Settings { out, force, duration, patience, parent, info, shown };
+        let settings = Settings { out, force, duration, patience, parent, no_camera: self.no_camera, info, shown };
         let recorded = record(&settings, &stop)?;
         if self.json {
             answer::json(&recorded)?;

@@ -39,6 +39,8 @@ pub struct Settings {
     pub patience: Option<Duration>,
     /// The bridge that started this recorder: when it is gone, the file is finished.
     pub parent: Option<u32>,
+    /// Whether pictures are left out: they are most of a clip, and fits do not read them.
+    pub no_camera: bool,
     /// What rides along.
     pub info: ClipInfo,
     /// The robot that viewers of the file are shown, and the cell it stands in.
@@ -105,7 +107,7 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
         return Err(RecordError::NoRoom { path: out.clone(), megabytes });
     }
     let node = Node::open("rt_bridge_recorder")?;
-    let mut sources = Sources::open(&node)?;
+    let mut sources = Sources::open(&node, !settings.no_camera)?;
     let events = node.publisher(topics::EVENTS)?;
     place.clear().map_err(WriteError::from)?;
     let mut writer = ClipWriter::create(out, &settings.info)?;

@@ -21,8 +21,8 @@ pub(super) struct Sources {
     command: Subscriber<ArmCommand>,
     object: Subscriber<ObjectPose>,
     objects: Subscriber<NamedPose>,
-    color: ImageSubscriber,
-    depth: ImageSubscriber,
+    /// `None`: pictures are left out.
+    pictures: Option<Pictures>,
     info: Subscriber<CameraInfo>,
     wrench: Subscriber<Wrench>,
     gripper: Subscriber<GripperState>,
@@ -34,6 +34,12 @@ pub(super) struct Sources {
     events: Subscriber<Event>,
     wake: Wake,
     counted: Counted,
+}
+
+/// The pictures of the camera.
+struct Pictures {
+    color: ImageSubscriber,
+    depth: ImageSubscriber,
 }
 
 /// Numbered streams: a jump of the number is a loss.
@@ -69,14 +75,21 @@ impl Counted {
 }
 
 impl Sources {
-    pub(super) fn open(node: &Node) -> Result<Self, TransportError> {
+    /// Every topic; those of pictures only `with_pictures`.
+    pub(super) fn open(node: &Node, with_pictures: bool) -> Result<Self, TransportError> {
+        let pictures = || {
+            let (color, depth) = (topics::CAMERA_COLOR, topics::CAMERA_DEPTH);
+            Ok::<_, TransportError>(Pictures {
+                color: node.image_subscriber(color)?,
+                depth: node.image_subscriber(depth)?,
+            })
+        };
         Ok(Self {
             state: node.subscriber(topics::ARM_STATE)?,
             command: node.subscriber(topics::ARM_COMMAND)?,
             object: node.subscriber(topics::OBJECT_POSE)?,
             objects: node.subscriber(topics::OBJECT_POSES)?,
-            color: node.image_subscriber(topics::CAMERA_COLOR)?,
-            depth: node.image_subscriber(topics::CAMERA_DEPTH)?,
+            pictures: with_pictures.then(pictures).transpose()?,
             info: node.subscriber(topics::CAMERA_INFO)?,
             wrench: node.subscriber(topics::WRENCH)?,
             gripper: node.subscriber(topics::GRIPPER)?,
@@ -160,18 +173,19 @@ impl Sources {
     }
 
     fn drain_pictures(&mut self, writer: &mut ClipWriter) -> Result<Result<(), WriteError>, TransportError> {
+        let Some(pictures) = &mut self.pictures else { return Ok(Ok(())) };
         let Counted { taken, lost, color, depth, .. } = &mut self.counted;
         let mut take = |header: &ImageHeader, last: &mut Option<u64>| {
             *taken += 1;
             *lost += Counted::picture(last, header.sequence);
         };
-        while let Some(picture) = self.color.receive()? {
+        while let Some(picture) = pictures.color.receive()? {
             take(picture.header(), color);
             if let Err(e) = writer.image(topics::CAMERA_COLOR, picture.header(), picture.bytes()) {
                 return Ok(Err(e));
             }
         }
-        while let Some(picture) = self.depth.receive()? {
+        while let Some(picture) = pictures.depth.receive()? {
             take(picture.header(), depth);
             if let Err(e) = writer.image(topics::CAMERA_DEPTH, picture.header(), picture.bytes()) {
                 return Ok(Err(e));
