@@ -140,3 +140,27 @@ fn what_a_person_mistypes_is_said_before_anything_moves() {
     let output = end(bridge);
     assert_eq!(said(&output).matches("began").count(), 1, "{}", said(&output));
 }
+
+#[test]
+fn a_stop_from_anybody_brakes_the_arm_and_voids_what_was_sending() {
+    let nobody = program("stops", &["stop"]).output().expect("the program runs");
+    assert!(nobody.status.code() == Some(1) && said(&nobody).contains("nothing was stopped"), "{}", said(&nobody));
+    let bridge = bridge("stops", &[]);
+    let node = Node::open_in(&format!("stops{}", std::process::id()), "a test").expect("shared memory");
+    let states = node.subscriber(ARM_STATE).expect("a place");
+    wait_for(&states, |state| state.cycle > 10);
+    let sender = program("stops", &["target", "joints", "1.5,-0.6,0,-2.2,0,1.6,0.785", "--speed", "0.3"])
+        .spawn()
+        .expect("it starts");
+    wait_for(&states, |state| state.dq_d[0] > 0.2);
+    let stopped = program("stops", &["stop", "--json"]).output().expect("the program runs");
+    assert!(stopped.status.success(), "{}", said(&stopped));
+    let answer: Value = serde_json::from_slice(&stopped.stdout).expect("JSON");
+    let sender = sender.wait_with_output().expect("it ended");
+    assert_eq!(sender.status.code(), Some(1), "{}", said(&sender));
+    let rests = wait_for(&states, |state| state.dq_d[0] == 0.0);
+    let later = wait_for(&states, |state| state.cycle > rests.cycle + 800);
+    assert_eq!(answer["q_d"][0].as_f64(), Some(later.q_d[0]), "it stays where it was stopped");
+    assert!(later.q_d[0] < 1.4, "before it came to its goal: {}", later.q_d[0]);
+    assert!(end(bridge).status.success());
+}

@@ -16,10 +16,10 @@ use std::path::PathBuf;
 /// realsense. The recording is played at its own pace, again for the frames that this machine was too slow for.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
-    rt_bridge convert table.bag --cell config/fr3_cell.toml --out table.mcap\n\n\
+    rt_bridge convert table.bag --cell fr3 --out table.mcap\n\n\
     JSON: file, frames (pairs of colour and depth), missing (frame numbers between the first and the last that are not\n\
     there), unpaired (depth pictures in the recording that it gives no colour picture for), passes.")]
-pub(super) struct ConvertArguments {
+pub struct ConvertArguments {
     /// A .bag recorded by librealsense or the RealSense Viewer
     #[arg(value_name = "FILE.bag")]
     bag: PathBuf,

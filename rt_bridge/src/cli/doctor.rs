@@ -25,7 +25,7 @@ use std::process::ExitCode;
     JSON: findings [{check, verdict (ok, warning, problem), found, remedy, delays_commands}],\n\
     communication_constraints_violation [checks that found a cause], ready, conclusion (the last line), wake_us.\n\
     Exit code 1 when not ready.")]
-pub(super) struct DoctorArguments {
+pub struct DoctorArguments {
     /// A robot to reach, fci://HOST
     #[arg(long, value_name = "ARM")]
     arm: Option<ArmChoice>,

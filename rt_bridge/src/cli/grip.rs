@@ -28,10 +28,10 @@ const POLL_PERIOD: Duration = Duration::from_millis(10);
 /// Tell the gripper of a running bridge what to do, and wait until its fingers rest
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  rt_bridge grip home\n  rt_bridge grip move 0.03 --speed 0.05\n  \
-    rt_bridge grip grasp 0.04 --force 40 --json\n\n\
+    rt_bridge grip grasp 0.04 --grip-force 40 --json\n\n\
     JSON: width, width_d [m], force [N] (null where the gripper does not tell), grasped, fault. Exit code 1 when the gripper\n\
     cannot open as wide, or holds nothing after `grasp`.")]
-pub(super) struct GripArguments {
+pub struct GripArguments {
     #[command(subcommand)]
     order: Order,
     /// Answer with one JSON object
@@ -52,13 +52,13 @@ enum Order {
         speed: Option<f64>,
     },
     /// Close until something of about this width is held
-    #[command(after_help = "Examples:\n  rt_bridge grip grasp 0.04 --force 40 --json")]
+    #[command(after_help = "Examples:\n  rt_bridge grip grasp 0.04 --grip-force 40 --json")]
     Grasp {
         /// Of the object [m], 0 to 0.5: 0.03 is 30 mm
         #[arg(value_name = "WIDTH", value_parser = width)]
         width: f64,
         /// How hard [N], 0.1 to 500. Default: as gently as it can
-        #[arg(long, value_name = "FORCE", value_parser = force)]
+        #[arg(long = "grip-force", alias = "force", value_name = "FORCE", value_parser = force)]
         force: Option<f64>,
     },
     /// Stay where the fingers are

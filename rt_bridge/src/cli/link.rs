@@ -35,7 +35,7 @@ use std::time::Duration;
     memory there to shared memory here), clock (offset of the other host's and its uncertainty [s], round_trips,\n\
     round_trip_us), outages, longest_outage [s]."
 )]
-pub(super) struct LinkArguments {
+pub struct LinkArguments {
     /// Address of this host that the other connects to, tcp/HOST:PORT; 0.0.0.0 for all of them
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<Endpoint>,

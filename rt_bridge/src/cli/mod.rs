@@ -10,14 +10,19 @@ mod link;
 mod record;
 mod run;
 mod serve;
+mod stop;
 mod target;
 
 use clap::{Parser, Subcommand};
 use shared_mem::command_line::{self, Build};
+use shared_mem::msg::arm::ArmState;
+use shared_mem::transport::Subscriber;
 use shared_mem::{console, parent};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
 
 /// Hardware to shared memory: drives a robot arm at 1 kHz and shows everybody on this machine what it does.
 ///
@@ -25,13 +30,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[derive(Debug, Parser)]
 #[command(after_help = "Examples:\n  \
         rt_bridge doctor                                               what this machine lacks for real time\n  \
-        rt_bridge run --cell config/fr3_cell.toml --arm sim            hold the simulated arm until Ctrl-C\n  \
+        rt_bridge run --cell fr3 --arm sim                             hold the simulated arm until Ctrl-C\n  \
         rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --record clip.mcap\n  \
         rt_bridge record --out clip.mcap --duration 10                 record what others do\n  \
         rt_bridge convert table.bag --out table.mcap                   a RealSense recording as a clip\n  \
         rt_bridge grip move 0.03                                       tell the gripper of a running bridge\n  \
-        rt_bridge target shift 0,0,0.05 --cell config/fr3_cell.toml    steer the arm of a running bridge\n  \
-        rt_bridge serve --cell config/fr3_cell.toml                    play a Franka robot for any libfranka program\n  \
+        rt_bridge target shift 0,0,0.05 --cell fr3                     steer the arm of a running bridge\n  \
+        rt_bridge stop                                                 brake it, whoever moves it\n  \
+        rt_bridge serve --cell fr3                                     play a Franka robot for any libfranka program\n  \
         rt_bridge link --listen tcp/0.0.0.0:7447                       let another host read along\n\n\
         Processes meet when the environment variable TWINALIGN_DOMAIN agrees (default 0).")]
 struct Arguments {
@@ -39,14 +45,16 @@ struct Arguments {
     verb: Verb,
 }
 
+// No documentation here: the program's own help would be replaced by it.
 #[derive(Debug, Subcommand)]
-enum Verb {
+pub enum Verb {
     Run(run::RunArguments),
     Record(record::RecordArguments),
     Convert(convert::ConvertArguments),
     Serve(serve::ServeArguments),
     Grip(grip::GripArguments),
     Target(target::TargetArguments),
+    Stop(stop::StopArguments),
     Link(link::LinkArguments),
     Doctor(doctor::DoctorArguments),
 }
@@ -57,11 +65,11 @@ const LOGGED: &str = "info,zenoh=off";
 
 /// Reads the command line and does what it says.
 pub fn main(build: &Build) -> ExitCode {
-    let _last_lines = console::start();
-    let arguments: Arguments = match command_line::parse(build) {
-        Ok(arguments) => arguments,
-        Err(code) => return code,
-    };
+    command_line::program(build, |arguments: Arguments| run(arguments.verb))
+}
+
+/// Does what a verb says.
+pub fn run(verb: Verb) -> ExitCode {
     tracing_subscriber::fmt()
         .with_writer(|| console::Log)
         .with_env_filter(
@@ -71,7 +79,7 @@ pub fn main(build: &Build) -> ExitCode {
         .with_target(false)
         .with_ansi(false)
         .init();
-    let done = match arguments.verb {
+    let done = match verb {
         // What it found out is its answer, and no error.
         Verb::Doctor(doctor) => doctor.execute(),
         Verb::Run(run) => run.execute().map(success),
@@ -80,6 +88,7 @@ pub fn main(build: &Build) -> ExitCode {
         Verb::Serve(serve) => serve.execute().map(success),
         Verb::Grip(grip) => grip.execute().map(success),
         Verb::Target(target) => target.execute().map(success),
+        Verb::Stop(stop) => stop.execute().map(success),
         Verb::Link(link) => link.execute().map(success),
     };
     match done {
@@ -106,6 +115,18 @@ fn stop_flag(parent: Option<u32>) -> anyhow::Result<Arc<AtomicBool>> {
         parent::when_gone(parent, move || stopping.store(true, Ordering::Relaxed))?;
     }
     Ok(stop)
+}
+
+/// The newest state, waiting for one if need be.
+fn newest_state(states: &Subscriber<ArmState>, patience: Duration) -> anyhow::Result<Option<ArmState>> {
+    let begin = Instant::now();
+    while begin.elapsed() < patience {
+        if let Some(state) = states.newest()? {
+            return Ok(Some(state));
+        }
+        thread::sleep(Duration::from_millis(2));
+    }
+    Ok(None)
 }
 
 #[cfg(test)]

@@ -24,17 +24,17 @@ use std::time::Duration;
 /// /twin/state and /twin/gap are not, because `twin shadow` makes them anew.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    rt_bridge run --cell config/fr3_cell.toml --arm sim\n  \
-    rt_bridge run --cell config/fr3_cell.toml --arm sim --effects hidden.toml --record clip.mcap --duration 20 --json\n  \
+    rt_bridge run --cell fr3 --arm sim\n  \
+    rt_bridge run --cell fr3 --arm sim --effects hidden.toml --record clip.mcap --duration 20 --json\n  \
     rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --controller torque_pd --realtime enforce\n  \
     rt_bridge run --cell cell.toml --arm fci://172.16.0.2 --gripper serial:///dev/ttyUSB0 --wrench can://can0\n  \
-    rt_bridge run --cell config/fr3_cell.toml --arm sim --tracker rgbd\n  \
+    rt_bridge run --cell fr3 --arm sim --tracker rgbd\n  \
     rt_bridge run --cell cell.toml --arm replay://clip.mcap\n\n\
     JSON: cycles, missed_cycles (deadlines that passed unused), overruns (work longer than a period), lost_packets,\n\
     wake_us (wake-up latency), exec_us, period_us, age_us (a state's arrival to shared memory), recorded, faults; null for\n\
     what was not measured.")]
-pub(super) struct RunArguments {
-    /// What the laboratory knows about its cell
+pub struct RunArguments {
+    /// What the laboratory knows about its cell; `fr3` for the one that is built in
     #[arg(long, value_name = "cell.toml")]
     cell: PathBuf,
     /// sim, fci://HOST or replay://CLIP.mcap

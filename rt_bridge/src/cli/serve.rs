@@ -21,14 +21,14 @@ use std::time::Duration;
 /// real-time kernel where there is none (franka::RealtimeConfig::kIgnore, or --realtime ignore with rt_bridge run).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    rt_bridge serve --cell config/fr3_cell.toml\n  \
-    rt_bridge run --cell config/fr3_cell.toml --arm fci://127.0.0.1 --realtime ignore   in another terminal, drives it\n  \
-    rt_bridge serve --cell config/fr3_cell.toml --effects hidden.toml --bind 0.0.0.0\n  \
-    rt_bridge serve --cell config/fr3_cell.toml --port 0 --lock-step --fast --json\n\n\
+    rt_bridge serve --cell fr3\n  \
+    rt_bridge run --cell fr3 --arm fci://127.0.0.1 --realtime ignore   in another terminal, drives it\n  \
+    rt_bridge serve --cell fr3 --effects hidden.toml --bind 0.0.0.0\n  \
+    rt_bridge serve --cell fr3 --port 0 --lock-step --fast --json\n\n\
     JSON: cycles (the robot's milliseconds), motions, reflexes, lost_commands, clients, refused (connections), slipped\n\
     (milliseconds that began so late that the robot's clock waited), late_us (how late its thread woke).")]
-pub(super) struct ServeArguments {
-    /// What the laboratory knows about its cell; [robot] has to be an FR3
+pub struct ServeArguments {
+    /// What the laboratory knows about its cell; `fr3` for the one that is built in. [robot] has to be an FR3
     #[arg(long, value_name = "cell.toml")]
     cell: PathBuf,
     /// Address of this machine to listen at; 0.0.0.0 for all of them

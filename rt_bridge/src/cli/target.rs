@@ -4,7 +4,7 @@ mod fingers;
 mod goal;
 mod way;
 
-use super::stop_flag;
+use super::{newest_state, stop_flag};
 use anyhow::{Result, bail, ensure};
 use clap::{Args, Subcommand};
 use goal::{Goal, Place};
@@ -38,15 +38,15 @@ const REST_SPEED: f64 = 1e-5;
 /// With the cell, the goal and the way there are looked at before anything moves: reach, ranges, table, speeds. Joints without a
 /// cell are looked at by the bridge, which knows the goal and not the way. The bridge plans the way within the limits of the arm.
 /// The target is repeated fifty times a second until the arm is there; Ctrl-C ends the stream, and the bridge brakes the arm
-/// 0.2 s later. docs/teleop.md has the messages.
+/// 0.2 s later, and `rt_bridge stop` brakes it at once. docs/teleop.md has the messages.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  rt_bridge target joints 0,-0.6,0,-2.2,0,1.6,0.785 --speed 0.5\n  \
-    rt_bridge target shift 0,0,0.05 --cell config/fr3_cell.toml\n  \
-    rt_bridge target pose 0.4,0.1,0.4,0,1,0,0 --cell config/fr3_cell.toml --json\n  \
+    rt_bridge target shift 0,0,0.05 --cell fr3\n  \
+    rt_bridge target pose 0.4,0.1,0.4,0,1,0,0 --cell fr3 --json\n  \
     rt_bridge target fingers 0.03\n\n\
     JSON: stream, q_d [rad] and seconds, or width [m]; off_m, how far the flange is from the pose. Exit code 1 when the goal\n\
     or the way there is none that the arm can go, when it was refused, or when the arm does not get there.")]
-pub(super) struct TargetArguments {
+pub struct TargetArguments {
     #[command(subcommand)]
     to: To,
     /// Share of each joint's highest speed, 0.02 to 1
@@ -60,9 +60,7 @@ pub(super) struct TargetArguments {
 #[derive(Debug, Subcommand)]
 enum To {
     /// Positions of all joints
-    #[command(
-        after_help = "Examples:\n  rt_bridge target joints 0,-0.6,0,-2.2,0,1.6,0.785 --cell config/fr3_cell.toml"
-    )]
+    #[command(after_help = "Examples:\n  rt_bridge target joints 0,-0.6,0,-2.2,0,1.6,0.785 --cell fr3")]
     Joints {
         /// One for each joint, with commas between them [rad]
         #[arg(value_name = "Q1,Q2,..", allow_hyphen_values = true, value_parser = positions)]
@@ -72,7 +70,7 @@ enum To {
         cell: Option<PathBuf>,
     },
     /// A pose of the flange
-    #[command(after_help = "Examples:\n  rt_bridge target pose 0.4,0.1,0.4,0,1,0,0 --cell config/fr3_cell.toml")]
+    #[command(after_help = "Examples:\n  rt_bridge target pose 0.4,0.1,0.4,0,1,0,0 --cell fr3")]
     Pose {
         /// Position [m] and quaternion w, x, y, z in the base frame
         #[arg(value_name = "X,Y,Z,QW,QX,QY,QZ", allow_hyphen_values = true, value_parser = seven)]
@@ -82,7 +80,7 @@ enum To {
         cell: PathBuf,
     },
     /// So far from where the flange is commanded to be, along the base frame's axes
-    #[command(after_help = "Examples:\n  rt_bridge target shift 0,0,0.05 --cell config/fr3_cell.toml")]
+    #[command(after_help = "Examples:\n  rt_bridge target shift 0,0,0.05 --cell fr3")]
     Shift {
         /// Way along x, y, z [m]
         #[arg(value_name = "DX,DY,DZ", allow_hyphen_values = true, value_parser = three)]
@@ -141,7 +139,7 @@ impl TargetArguments {
             events: node.subscriber(topics::EVENTS)?,
             targets: node.publisher(topics::ARM_TARGET)?,
         };
-        let Some(first) = newest(&arm.states, PATIENCE)? else {
+        let Some(first) = newest_state(&arm.states, PATIENCE)? else {
             bail!(
                 "no bridge showed an arm within {} s; start one with `rt_bridge run --cell cell.toml --arm sim`",
                 PATIENCE.as_secs()
@@ -197,7 +195,9 @@ impl ArmLine {
                 let text = event.text().replace(&name, "this stream ").replace(name.trim_end(), "this stream");
                 ensure!(event.level == EventLevel::Info || event.text() == text, "the bridge says: {text}");
             }
-            let Some(state) = newest(&self.states, PATIENCE)? else { bail!("the bridge fell silent; start it again") };
+            let Some(state) = newest_state(&self.states, PATIENCE)? else {
+                bail!("the bridge fell silent; start it again")
+            };
             let ours = state.motion_id == target.stream;
             ensure!(
                 !(ours && state.motion == MotionStatus::Braked),
@@ -215,24 +215,14 @@ impl ArmLine {
     /// Waits until the bridge has seen that the stream has ended, so that whoever comes next is not refused.
     fn leave(&self, stream: u64) -> Result<ArmState> {
         loop {
-            let Some(state) = newest(&self.states, PATIENCE)? else { bail!("the bridge fell silent; start it again") };
+            let Some(state) = newest_state(&self.states, PATIENCE)? else {
+                bail!("the bridge fell silent; start it again")
+            };
             if state.motion_id != stream || state.motion != MotionStatus::Playing {
                 return Ok(state);
             }
         }
     }
-}
-
-/// The newest state, waiting for one if need be.
-fn newest(states: &Subscriber<ArmState>, patience: Duration) -> Result<Option<ArmState>> {
-    let begin = Instant::now();
-    while begin.elapsed() < patience {
-        if let Some(state) = states.newest()? {
-            return Ok(Some(state));
-        }
-        thread::sleep(Duration::from_millis(2));
-    }
-    Ok(None)
 }
 
 #[cfg(test)]
