@@ -1,6 +1,7 @@
 //! The cell in simulation: arm, contact, sensors, live shadow, replay.
 
 pub mod arm;
+pub mod cli;
 pub mod contact_law;
 pub mod control;
 pub mod description;
@@ -17,6 +18,8 @@ pub mod sensors;
 pub mod shadow;
 #[cfg(test)]
 mod shipped;
+#[cfg(feature = "teleop")]
+pub mod show;
 pub mod sim;
 pub mod sliding;
 pub mod task;
@@ -24,5 +27,7 @@ pub mod task;
 pub mod teleop;
 #[cfg(feature = "viewer")]
 pub mod viewer;
+#[cfg(feature = "teleop")]
+pub mod web;
 pub mod world;
 pub mod xml;

@@ -1,6 +1,8 @@
 //! `twin reconstruct articulated`: an object with a part that moves, out of scans.
 
 use super::asset_folder::{Outputs, kept, mass, metres, piece};
+use crate::physics::convex_pieces;
+use crate::scene::mesh_in_its_middle;
 use anyhow::{Context as _, ensure};
 use nalgebra::{Isometry3, Similarity3, Translation3};
 use reconstruct::articulated::{self, Articulated, Joint, Marks};
@@ -14,8 +16,6 @@ use shared_mem::output::OutputFolder;
 use shared_mem::{answer, console, ending};
 use splat::SplatCloud;
 use std::path::{Path, PathBuf};
-use twin::physics::convex_pieces;
-use twin::scene::mesh_in_its_middle;
 
 /// An object with a part that moves, out of two states of it: both parts, the hinge or slide between them, URDF, a report.
 #[derive(clap::Args)]

@@ -1,6 +1,9 @@
 //! `twin label-splats`: the robot out of a scanned cell, one splat file for each link.
 
 use super::look::joint;
+use crate::arm::MAX_JOINTS;
+use crate::reconstruct::{STARTS, SurfacePoints, align, label};
+use crate::render::{Hand, RobotSurface};
 use anyhow::{Context as _, bail, ensure};
 use nalgebra::{Isometry3, Point3, Quaternion, Similarity3, Translation3, UnitQuaternion};
 use shared_mem::answer;
@@ -10,9 +13,6 @@ use shared_mem::progress::{Planned, Progress};
 use shared_mem::quantity::number;
 use splat::{SplatCloud, link_file};
 use std::path::PathBuf;
-use twin::arm::MAX_JOINTS;
-use twin::reconstruct::{STARTS, SurfacePoints, align, label};
-use twin::render::{Hand, RobotSurface};
 
 /// Finds the robot in a scanned cell and parts the scan: one splat file for each link, in its frame, and the rest.
 #[derive(clap::Args)]
@@ -25,7 +25,7 @@ Examples:
   twin label-splats scan.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --out fr3_splats
   twin label-splats scan.ply --cell cell.toml --joints 0,-0.78,0,-2.36,0,1.57,0.78 --start 0.4,0,0.1,1,0,0,0,0.31 --out fr3_splats
   twin render session --splats fr3_splats --out frames")]
-pub(crate) struct LabelSplats {
+pub struct LabelSplats {
     /// The scan: 3DGS PLY, or SuperSplat's compressed PLY
     #[arg(value_name = "SCAN.ply")]
     scan: PathBuf,

@@ -1,11 +1,11 @@
 //! How the twin looks and who draws it: the arguments that every verb with pictures has.
 
+use crate::render::Drawer;
+use crate::render::session::{TwinView, ViewError};
 use shared_mem::cell::Cell;
 use shared_mem::console;
 use shared_mem::quantity::number;
 use std::path::PathBuf;
-use twin::render::Drawer;
-use twin::render::session::{TwinView, ViewError};
 
 /// The robot's looks, and the device.
 #[derive(clap::Args)]

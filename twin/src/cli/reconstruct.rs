@@ -2,6 +2,7 @@
 
 use super::articulated::ArticulatedVerb;
 use super::asset_folder::{Dataset, Outputs, kept, mass, metres, piece};
+use crate::physics::convex_pieces;
 use anyhow::{Context as _, ensure};
 use nalgebra::Point3;
 use reconstruct::assets::{self, Labels};
@@ -12,7 +13,6 @@ use reconstruct::scene;
 use shared_mem::quantity::number;
 use shared_mem::{answer, console, ending};
 use std::path::{Path, PathBuf};
-use twin::physics::convex_pieces;
 
 /// Makes assets of a simulation out of scans: objects as closed meshes with their mass, scenes as surfaces and splats.
 #[derive(clap::Args)]
@@ -22,7 +22,7 @@ Examples:
   twin reconstruct object scan --out mug --mass 0.118 --scale 0.0231
   twin reconstruct articulated laptop_closed laptop_open --out laptop
   twin reconstruct scene cell_scan --out cell_scene")]
-pub(crate) struct Reconstruct {
+pub struct Reconstruct {
     #[command(subcommand)]
     what: What,
 }

@@ -1,6 +1,7 @@
 //! `twin render`: real, twin and difference side by side, as PNG files and, where ffmpeg is there, as a film.
 
 use super::look::Look;
+use crate::render::session::{ViewError, beside, pixels_of};
 use anyhow::{Context as _, bail, ensure};
 use shared_mem::frames::{Base, Object, Pose};
 use shared_mem::msg::object::ObjectName;
@@ -10,7 +11,6 @@ use shared_mem::recording::{ObjectSeries, PictureKind, Session, for_pictures, wr
 use shared_mem::{answer, console};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use twin::render::session::{ViewError, beside, pixels_of};
 
 /// Draws the twin beside every recorded picture: what the camera saw, what the twin shows, where they differ.
 #[derive(clap::Args)]
@@ -23,7 +23,7 @@ Examples:
   twin render session --out frames
   twin render session/clip_00.mcap --every 10 --splats fr3_splats --film --out frames
   twin render session --device gpu --out frames")]
-pub(crate) struct Render {
+pub struct Render {
     /// Session folder (with cell.toml), or one clip.
     #[arg(value_name = "SESSION|CLIP")]
     path: PathBuf,

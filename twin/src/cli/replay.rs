@@ -1,5 +1,6 @@
 //! `twin replay`: the recorded commands, simulated; real against simulated as a table or as JSON.
 
+use crate::replay::{Options, replay};
 use anyhow::{Context, bail};
 use shared_mem::ending;
 use shared_mem::parent;
@@ -7,7 +8,6 @@ use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
 use shared_mem::{answer, console};
 use std::path::PathBuf;
-use twin::replay::{Options, replay};
 
 /// Simulates the recorded commands of a session or clip: real against simulated.
 #[derive(clap::Args)]
@@ -15,7 +15,7 @@ use twin::replay::{Options, replay};
 The twin starts in the recorded state, gets the recorded commands at their stamps, and is not corrected on the way (but
 behind a hole in the commands it starts again, with a note).
 Joint errors are root mean squares over the clip; ADD and ADD-S are means over the recorded object poses. How far a gap
-shrinks is what `calibration diagnose` measures, on held-out clips and in units of the noise (docs/measuring.md).
+shrinks is what `calibration diagnose` measures, on held-out clips and in units of the noise (docs/figures.md).
 
 A clip that cannot be replayed is named on stderr, with the reason, and the others are replayed. The exit code is 1 only
 when none could be, or when one could not be written.
@@ -24,7 +24,7 @@ Examples:
   twin replay session
   twin replay session/clip_00.mcap --out simulated.mcap
   twin replay session --parameters theta.toml --json")]
-pub(crate) struct Replay {
+pub struct Replay {
     /// Session folder (with cell.toml), or one clip.
     #[arg(value_name = "SESSION|CLIP")]
     path: PathBuf,

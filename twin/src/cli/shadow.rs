@@ -1,6 +1,10 @@
 //! `twin shadow`: mirrors a running bridge and publishes the gap.
 
 use super::look::Look;
+#[cfg(feature = "viewer")]
+use crate::render::LiveView;
+use crate::shadow::live::{Live, Watcher};
+use crate::shadow::{Mirrored, Shadow as Twin, Summary};
 use anyhow::{Context as _, bail};
 use clap::Args;
 use shared_mem::cell::Cell;
@@ -13,10 +17,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-#[cfg(feature = "viewer")]
-use twin::render::LiveView;
-use twin::shadow::live::{Live, Watcher};
-use twin::shadow::{Mirrored, Shadow as Twin, Summary};
 
 /// Mirror a running cell in simulation and publish how far the two are apart.
 ///
@@ -25,14 +25,14 @@ use twin::shadow::{Mirrored, Shadow as Twin, Summary};
 /// /twin/gap and that of each object with a name on /twin/objects.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    twin shadow --cell config/fr3_cell.toml                       until Ctrl-C, gap on the terminal\n  \
-    twin shadow --cell config/fr3_cell.toml --viewer              in Foxglove or Lichtblick: ws://127.0.0.1:8765\n  \
+    twin shadow --cell fr3                       until Ctrl-C, gap on the terminal\n  \
+    twin shadow --cell fr3 --viewer              in Foxglove or Lichtblick: ws://127.0.0.1:8765\n  \
     twin shadow --cell cell.toml --viewer --splats fr3_splats     the twin's pictures from a scanned robot\n  \
     twin shadow --cell cell.toml --parameters theta.toml --duration 60 --json\n\n\
     JSON: cycles, real_time_factor, dropped, alignments, age_us, gap (joint_rms_rad, object_add_m, object_add_s_m, and\n\
     objects: add_m and add_s_m of each by its name); null for what was not measured.")]
-pub(crate) struct Shadow {
-    /// What is known about the cell; the same file the bridge runs with
+pub struct Shadow {
+    /// What is known about the cell: the same file, or `fr3`, that the bridge runs with
     #[arg(long, value_name = "CELL.toml")]
     cell: PathBuf,
     /// Identified parameters for the twin
@@ -120,7 +120,7 @@ type ViewerThread = std::thread::JoinHandle<anyhow::Result<()>>;
 fn viewer(cell: &Cell, look: &Look, stop: &Arc<AtomicBool>) -> anyhow::Result<ViewerThread> {
     let camera = cell.camera.as_ref();
     let pictures = camera.map(|camera| Ok::<_, anyhow::Error>(LiveView::new(look.view(cell)?, camera.latency)));
-    let viewer = twin::viewer::Viewer::start(cell, pictures.transpose()?)?;
+    let viewer = crate::viewer::Viewer::start(cell, pictures.transpose()?)?;
     console::line(format_args!("viewer: open {} in Foxglove or Lichtblick", viewer.address()));
     let stop = Arc::clone(stop);
     Ok(std::thread::Builder::new().name("viewer".into()).spawn(move || Ok(viewer.run(&stop)?))?)

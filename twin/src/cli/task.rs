@@ -1,5 +1,6 @@
 //! `twin task`: a task's bodies placed and simulated; did they come to rest, where, and was it a success.
 
+use crate::task::{Episode, Run, Task as TaskFile};
 use anyhow::Context as _;
 use serde::Serialize;
 use shared_mem::answer;
@@ -12,7 +13,6 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use twin::task::{Episode, Run, Task as TaskFile};
 
 /// Places the bodies of a task, simulates them, and says whether they come to rest, where, and whether it is a success.
 #[derive(clap::Args)]
@@ -22,16 +22,16 @@ a scripted motion; docs/tasks.md has every key. An episode ends with success, or
 episode becomes a clip of its own in a folder, named by its seed; those that are finished stay whatever happens to the rest.
 
 Examples:
-  twin task twin/tasks/push_milk.toml
-  twin task twin/tasks/stack_boxes.toml --seed 3 --duration 5
-  twin task twin/tasks/close_laptop.toml --episodes 50 --out laptop.json
-  twin task twin/tasks/pick_carrot.toml --episodes 50 --noise 0.003 --record carrot
-  twin task twin/tasks/pick_carrot.toml --json
+  twin task push_milk
+  twin task stack_boxes --seed 3 --duration 5
+  twin task close_laptop --episodes 50 --out laptop.json
+  twin task pick_carrot --episodes 50 --noise 0.003 --record carrot
+  twin task pick_carrot --json
 
 JSON: task, successes, and for each of episodes seed, duration_s, at_rest, at_rest_since_s, success, progress (0 to 1: how far it
 came), missed (conditions that did not hold at the end), arm_fault (what the arm cannot do of the motion), contacts (names of bodies that press on each other), and bodies: name, start and end (position, orientation_wxyz, joint), speed_m_s.")]
-pub(crate) struct Task {
-    /// The task file
+pub struct Task {
+    /// The task file, or a name of those that are built in: push_milk, stack_boxes, pick_carrot, close_laptop
     #[arg(value_name = "TASK.toml")]
     file: PathBuf,
     /// The start of the first episode; the others follow it
@@ -135,7 +135,7 @@ impl Answer {
                 Some(since) => format!("at rest since {since:.3} s"),
                 None => {
                     let fastest = episode.bodies.iter().max_by(|a, b| a.speed_m_s.total_cmp(&b.speed_m_s));
-                    let named = |body: &twin::task::BodyEnd| format!(", `{}` at {:.3} m/s", body.name, body.speed_m_s);
+                    let named = |body: &crate::task::BodyEnd| format!(", `{}` at {:.3} m/s", body.name, body.speed_m_s);
                     format!("not at rest{}", fastest.map_or(String::new(), named))
                 }
             };

@@ -1,5 +1,9 @@
 //! `twin teleop`: a task's arm steered at a page in a browser, and recorded.
 
+use super::host_name;
+use crate::task::Task;
+use crate::teleop::{Recording, serve};
+use crate::web::Address;
 use anyhow::Context as _;
 use shared_mem::quantity::seconds;
 use shared_mem::{answer, origin::Origin, recording::ClipInfo};
@@ -9,8 +13,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use twin::task::Task;
-use twin::teleop::{Address, Recording, serve};
 
 /// Lets a person steer the arm of a task at a page in a browser, and records what it does.
 #[derive(clap::Args)]
@@ -20,18 +22,18 @@ the gripper. An episode begins at a button and ends with success, at a button, o
 kept becomes a clip, as with `twin task --record`. The first page steers, others watch. docs/teleop.md has keys and messages.
 
 Examples:
-  twin teleop --task twin/tasks/pick_carrot.toml
-  twin teleop --task twin/tasks/pick_carrot.toml --record carrot
-  twin teleop --task twin/tasks/push_milk.toml --record milk --seed 100 --bind 0.0.0.0 --port 8400
-  twin teleop --task twin/tasks/push_milk.toml --bind 0.0.0.0 --name bench.lab.example
+  twin teleop --task pick_carrot
+  twin teleop --task pick_carrot --record carrot
+  twin teleop --task push_milk --record milk --seed 100 --bind 0.0.0.0 --port 8400
+  twin teleop --task push_milk --bind 0.0.0.0 --name bench.lab.example
 
 Escape stops: the arm holds until an episode is started. Every page can stop, also one that watches.
 
 Ctrl-C ends it; an episode that is under way is discarded, and that is said.
 
 JSON: task, kept, successes, discarded, cut_short (the seed of an episode that was under way at the end), clips.")]
-pub(crate) struct Teleop {
-    /// The task file; it needs an [arm] and a [[camera]]
+pub struct Teleop {
+    /// The task file, which needs an [arm] and a [[camera]]; or a name of those that are built in: push_milk, stack_boxes, pick_carrot, close_laptop
     #[arg(long, value_name = "TASK.toml")]
     task: PathBuf,
     /// Writes each episode that is kept into this folder as a clip, `episode_SEED.mcap`
@@ -65,15 +67,6 @@ pub(crate) struct Teleop {
     /// Prints one JSON object on stdout at the end
     #[arg(long)]
     json: bool,
-}
-
-fn host_name(text: &str) -> Result<String, String> {
-    let is_name = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
-    if !text.is_empty() && text.chars().all(is_name) {
-        Ok(text.to_owned())
-    } else {
-        Err("give a host's name without http:// and port, as bench.lab.example".to_owned())
-    }
 }
 
 impl Teleop {

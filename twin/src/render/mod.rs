@@ -12,6 +12,7 @@ mod live;
 pub(crate) mod looks;
 mod misplaced;
 mod painter;
+mod portrait;
 mod robot;
 pub mod session;
 mod shown;
@@ -19,6 +20,9 @@ mod shown;
 pub use live::{Beside, LiveView};
 pub(crate) use misplaced::misplaced;
 pub use painter::{Drawer, Model, PaintError, Painter};
+pub use portrait::portrait;
+#[cfg(feature = "teleop")]
+pub(crate) use portrait::{Look, points_of};
 pub use robot::{Hand, RobotSurface};
 pub(crate) use shown::{ScannedLink, Shown};
 pub use splat::{Mesh, Pinhole, Raster};

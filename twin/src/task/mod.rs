@@ -25,6 +25,7 @@
 mod acting;
 mod arm;
 mod articulated;
+mod built_in;
 mod camera;
 mod cell;
 mod condition;
@@ -86,7 +87,8 @@ pub struct Task {
 }
 
 impl Task {
-    /// Reads a task file; meshes lie relative to it.
+    /// Reads a task file; meshes lie relative to it. The name of a task that ships with the project, `push_milk`, is that task unless
+    /// there is a file of that name.
     ///
     /// # Errors
     /// [`TomlFileError`] with file, line and key of what is wrong.

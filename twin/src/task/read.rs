@@ -2,6 +2,7 @@
 
 use super::Task;
 use super::arm::Carrier;
+use super::built_in;
 use super::camera::TaskCamera;
 use super::condition::Condition;
 use super::file::{
@@ -31,6 +32,9 @@ struct Source<'a> {
 }
 
 pub(super) fn read(path: &Path) -> Result<Task, TomlFileError> {
+    if let Some(text) = built_in::text(path) {
+        return parse(text, path);
+    }
     let text = input::text(path, input::Kind::Configuration)?;
     parse(&text, path)
 }

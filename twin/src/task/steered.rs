@@ -156,7 +156,7 @@ impl Steered {
             self.clear = now;
         } else {
             // Back to where it came from, whatever is asked for.
-            self.held_by = Some("it would enter what stands there");
+            self.held_by = Some("blocked: collision with a fixed body");
             self.go_for(carrier, self.clear);
             return;
         }

@@ -10,16 +10,14 @@
 //! | `orders` | what of it waits for the thread that steers, and a stop that waits behind nothing |
 //! | `steering` | the thread that simulates, draws and records: one episode after the other |
 //! | `seats` | which of the pages steers |
-//! | `hosts` | by which names the page may be opened |
 //! | `server` | the page, and a WebSocket for each that is open |
 //! | `page.html` | the page itself: nothing else is fetched |
 
-mod hosts;
 mod message;
 mod orders;
 mod seats;
 mod server;
 mod steering;
 
-pub use server::{Address, ServeError, serve};
+pub use server::{ServeError, serve};
 pub use steering::{Recording, Summary, TeleopError};

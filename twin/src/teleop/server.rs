@@ -1,21 +1,19 @@
-//! The page, and a WebSocket for each that is open (the only code that asks `axum` and `tokio`).
+//! The page, and a WebSocket for each that is open.
 
-use super::hosts::Hosts;
 use super::message::Input;
 use super::orders::Orders;
 use super::seats::{Seat, Seats};
 use super::steering::{Recording, Steering, Summary, TeleopError};
 use crate::task::Task;
+use crate::web::{Address, Site, WebError};
 use axum::Router;
 use axum::body::Bytes;
+use axum::extract::State;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::extract::{Request, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::http::StatusCode;
 use axum::response::{Html, IntoResponse as _, Response};
 use axum::routing::get;
-use axum::serve::ListenerExt as _;
-use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -37,36 +35,15 @@ const ASK: Duration = Duration::from_secs(2);
 const UNANSWERED: u32 = 5;
 /// The same of one that takes nothing for so long.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
-/// How often it is looked whether to end.
-const POLL_PERIOD: Duration = Duration::from_millis(50);
-
-/// Where the page is.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Address {
-    /// Of which of this machine's addresses; the loopback's is seen by this machine alone.
-    pub ip: IpAddr,
-    /// 0: any that is free.
-    pub port: u16,
-    /// Names by which the page is opened, beside `localhost`, this machine's own and its address.
-    pub names: Vec<String>,
-}
-
 /// The page cannot be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     /// The task, or where clips go.
     #[error(transparent)]
     Teleop(#[from] TeleopError),
-    #[error("cannot listen on {at}: {source}; give another --port, or an address of this machine to --bind")]
-    Listen {
-        /// What was asked for.
-        at: SocketAddr,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A thread or its timer.
-    #[error("the page cannot be served: {0}; look at the machine's memory and limits, then start again")]
-    System(std::io::Error),
+    /// The page.
+    #[error(transparent)]
+    Web(#[from] WebError),
     /// A thread of this program.
     #[error("the simulation failed; episodes that were kept are there; please report this")]
     Failed,
@@ -79,7 +56,6 @@ struct Shared {
     orders: Arc<Orders>,
     hello: Arc<str>,
     frames: watch::Receiver<Bytes>,
-    hosts: Arc<Hosts>,
 }
 
 /// Shows the page until `stop`; `ready` is given its address. One episode after the other is simulated and recorded.
@@ -94,20 +70,11 @@ pub fn serve(
     stop: &Arc<AtomicBool>,
     ready: impl FnOnce(SocketAddr),
 ) -> Result<Summary, ServeError> {
-    let at = SocketAddr::new(address.ip, address.port);
     let steering = Steering::new(task, camera, recording)?;
-    let listen = |source| ServeError::Listen { at, source };
-    let listener = TcpListener::bind(at).map_err(listen)?;
-    listener.set_nonblocking(true).map_err(listen)?;
+    let site = Site::open(address)?;
     let (orders, (shown, frames)) = (Arc::new(Orders::default()), watch::channel(Bytes::new()));
     let ordered = Arc::clone(&orders);
-    let shared = Shared {
-        seats: Seats::new(Arc::clone(&orders)),
-        orders,
-        hello: steering.hello().into(),
-        frames,
-        hosts: Arc::new(Hosts::of(address.ip, &address.names)),
-    };
+    let shared = Shared { seats: Seats::new(Arc::clone(&orders)), orders, hello: steering.hello().into(), frames };
     let stopping = Arc::clone(stop);
     let steered = std::thread::Builder::new()
         .name("steering".into())
@@ -117,45 +84,13 @@ pub fn serve(
                 shown.send_replace(frame.into());
             })
         })
-        .map_err(ServeError::System)?;
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build().map_err(ServeError::System)?;
-    let served = runtime.block_on(async {
-        let listener = tokio::net::TcpListener::from_std(listener)?;
-        ready(listener.local_addr()?);
-        // A picture does not wait for the next.
-        let listener = listener.tap_io(|stream| drop(stream.set_nodelay(true)));
-        let routes = Router::new().route("/", get(|| async { Html(PAGE) })).route("/ws", get(upgrade));
-        let routes = routes.layer(from_fn_with_state(shared.clone(), gate)).with_state(shared);
-        tokio::select! {
-            ended = axum::serve(listener, routes) => ended,
-            () = asked(stop) => Ok(()),
-        }
-    });
+        .map_err(WebError::System)?;
+    let routes = Router::new().route("/", get(|| async { Html(PAGE) })).route("/ws", get(upgrade)).with_state(shared);
+    let served = site.serve(routes, stop, ready);
     stop.store(true, Ordering::Relaxed);
-    runtime.shutdown_background();
     let summary = steered.join().map_err(|_| ServeError::Failed)?;
-    served.map_err(ServeError::System)?;
+    served?;
     Ok(summary)
-}
-
-async fn asked(stop: &AtomicBool) {
-    while !stop.load(Ordering::Relaxed) {
-        tokio::time::sleep(POLL_PERIOD).await;
-    }
-}
-
-/// Answers a request where it is admitted; each answer says that no other site's page may show it within itself.
-async fn gate(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    let mut answer = match admitted(request.headers(), &shared.hosts) {
-        Ok(()) => next.run(request).await,
-        Err(refusal) => refusal.into_response(),
-    };
-    // Who clicks on this page within one of another site does not see what he does.
-    let headers = answer.headers_mut();
-    headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static("frame-ancestors 'none'"));
-    headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
-    answer
 }
 
 async fn upgrade(State(shared): State<Shared>, socket: WebSocketUpgrade) -> Response {
@@ -168,26 +103,6 @@ async fn upgrade(State(shared): State<Shared>, socket: WebSocketUpgrade) -> Resp
         // A page that goes away in the middle is no fault of anybody's.
         let _gone = page.attend().await;
     })
-}
-
-/// Whether a request comes from this page: another site that a browser shows must not steer, nor one whose name leads here.
-fn admitted(headers: &HeaderMap, hosts: &Hosts) -> Result<(), (StatusCode, &'static str)> {
-    let only = |name| {
-        let mut values = headers.get_all(name).iter();
-        (values.next().map(HeaderValue::to_str), values.next().is_none())
-    };
-    let (Some(Ok(host)), true) = only(header::HOST) else {
-        return Err((StatusCode::FORBIDDEN, "give one Host: the address at which the page is"));
-    };
-    if !hosts.allow(host) {
-        let words = "the page is at the address that twin teleop prints; by another name it is opened once that is given to --name";
-        return Err((StatusCode::FORBIDDEN, words));
-    }
-    match only(header::ORIGIN) {
-        (None, _) => Ok(()),
-        (Some(Ok(origin)), true) if origin.strip_prefix("http://") == Some(host) => Ok(()),
-        _ => Err((StatusCode::FORBIDDEN, "only the page that this program shows may connect")),
-    }
 }
 
 /// One open page, in its seat.
@@ -279,43 +194,5 @@ impl Page {
             return Err("too many messages at once, some are left out; send no more than fifty a second".into());
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn other_sites_are_not_admitted() {
-        let headers = |host: &'static str, origin: Option<&'static str>| {
-            let mut headers = HeaderMap::new();
-            headers.insert(header::HOST, host.parse().expect("a value"));
-            if let Some(origin) = origin {
-                headers.insert(header::ORIGIN, origin.parse().expect("a value"));
-            }
-            headers
-        };
-        let hosts = Hosts::of([192, 168, 1, 5].into(), &["bench".to_owned()]);
-        for (host, origin, admits) in [
-            ("192.168.1.5:8380", None, true),
-            ("localhost:8380", Some("http://localhost:8380"), true),
-            ("localhost:8380", Some("http://example.org"), false),
-            ("localhost:8380", Some("http://localhost:8381"), false),
-            ("localhost:8380", Some("https://localhost:8380"), false),
-            ("localhost:8380", Some("null"), false),
-            ("example.org:8380", Some("http://example.org:8380"), false),
-            ("example.org:8380", None, false),
-            ("bench:8380", Some("http://bench:8380"), true),
-            ("bench:8380", Some("https://example.org"), false),
-        ] {
-            assert_eq!(admitted(&headers(host, origin), &hosts).is_ok(), admits, "{host} {origin:?}");
-        }
-        assert!(admitted(&HeaderMap::new(), &hosts).is_err(), "no host");
-        for name in [header::HOST, header::ORIGIN] {
-            let mut twice = headers("bench:8380", Some("http://bench:8380"));
-            twice.append(name, "http://bench:8380".parse().expect("a value"));
-            assert!(admitted(&twice, &hosts).is_err(), "two of one header");
-        }
     }
 }
