@@ -8,6 +8,7 @@
 //! | [`acting`] | a policy on a robot, through a running bridge |
 //! | [`answer`] | what verbs answer, as plain types |
 //! | [`check`] | the doctor of a recording: whether the data can mean what they say |
+//! | [`cli`] | the command line: one file a verb |
 //! | [`demonstrations`] | recorded episodes of tasks as data to learn from |
 //! | [`demo`] | the whole story on the simulated cell, in one command |
 //! | [`diagnose`] | where the gap lies, what causes it, how far it shrinks |
@@ -24,6 +25,7 @@ pub mod acting;
 pub mod answer;
 pub mod benchmark;
 pub mod check;
+pub mod cli;
 pub mod demo;
 pub mod demonstrations;
 pub mod diagnose;

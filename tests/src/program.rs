@@ -61,7 +61,7 @@ impl Program {
     #[must_use]
     pub fn start_through(through: &[&str], name: &str, domain: &str, arguments: &[&str]) -> Self {
         let runs_on =
-            arguments.first().is_some_and(|verb| ["run", "serve", "record", "shadow", "teleop"].contains(verb));
+            arguments.first().is_some_and(|verb| ["run", "serve", "record", "shadow", "show", "teleop"].contains(verb));
         let own_id = std::process::id().to_string();
         let parent: &[&str] = if runs_on { &[parent::FLAG, &own_id] } else { &[] };
         let path = program_path(name);

@@ -104,7 +104,7 @@ pub fn documents() -> Vec<(String, String)> {
 }
 
 /// The folders with the sources of the product.
-pub const PRODUCT: [&str; 16] = [
+pub const PRODUCT: [&str; 17] = [
     "shared_mem/src",
     "twin/splat/src",
     "twin/fusion/src",
@@ -121,6 +121,7 @@ pub const PRODUCT: [&str; 16] = [
     "calibration/worlds/src",
     "calibration/tools/src",
     "calibration/src",
+    "twinalign/src",
 ];
 
 /// Every string in the sources of the product, tests left out: its file, and the string with escaped line ends as spaces.

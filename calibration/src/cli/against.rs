@@ -1,10 +1,10 @@
 //! `calibration diagnose A --against B`: files, and what is printed.
 
 use super::diagnose::{Arguments, theta_file};
-use calibration::check::gate;
-use calibration::diagnose::Options;
-use calibration::diagnose::against::{Comparison, compare_kept};
-use calibration::report;
+use crate::check::gate;
+use crate::diagnose::Options;
+use crate::diagnose::against::{Comparison, compare_kept};
+use crate::report;
 use inference::interrupt::Interrupt;
 use shared_mem::console;
 use shared_mem::output::Destination;

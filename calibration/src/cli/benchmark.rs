@@ -1,11 +1,11 @@
 //! `calibration benchmark`.
 
 use super::print;
-use calibration::benchmark::calibrate;
-use calibration::benchmark::run::{Extent, Outcome, Plan, run as judge};
-use calibration::benchmark::score::Scores;
-use calibration::report::benchmark::page;
-use calibration::report::terminal;
+use crate::benchmark::calibrate;
+use crate::benchmark::run::{Extent, Outcome, Plan, run as judge};
+use crate::benchmark::score::Scores;
+use crate::report::benchmark::page;
+use crate::report::terminal;
 use inference::interrupt::Interrupt;
 use serde_json::json;
 use shared_mem::cell::Cell;
@@ -31,9 +31,9 @@ Examples:
   calibration benchmark --null 300 --json > null.json
   calibration benchmark --size 2 --report benchmark.html
   calibration benchmark --calibrate peers --json > criteria.json")]
-pub(super) struct BenchmarkArguments {
+pub struct BenchmarkArguments {
     /// Cell that all worlds share.
-    #[arg(long, value_name = "CELL.TOML", default_value = "config/fr3_cell.toml")]
+    #[arg(long, value_name = "CELL.TOML", default_value = "fr3")]
     cell: PathBuf,
     /// How often every effect is met.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]

@@ -1,7 +1,7 @@
 //! `calibration capture`.
 
 use super::print;
-use calibration::keys::Keys;
+use crate::keys::Keys;
 use capture::control_hit_slide::Series;
 use capture::request::Kind;
 use capture::task::Task;
@@ -14,7 +14,7 @@ use shared_mem::quantity::{number, numbers};
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
-pub(super) enum Capture {
+pub enum Capture {
     /// All joints at once along sums of sines, inside every limit: what identifying the arm needs.
     Excitation(ExcitationArguments),
     /// The tool runs up to the object, hits it and lets it slide: what identifying the object and diagnosing contact need.
@@ -26,7 +26,7 @@ pub(super) enum Capture {
 /// What every capture is asked for.
 #[derive(Debug, clap::Args)]
 struct TaskArguments {
-    /// What the laboratory knows about its cell.
+    /// What the laboratory knows about its cell; `fr3` for the one that is built in.
     #[arg(long, value_name = "CELL.TOML")]
     cell: PathBuf,
     /// Plays clip N of the session again instead of a new one: the same set points. Several are played in turn.
@@ -47,6 +47,9 @@ struct TaskArguments {
     /// Whether that bridge refuses to run without real-time guarantees: enforce or ignore [default: the bridge's own].
     #[arg(long, value_parser = ["enforce", "ignore"])]
     realtime: Option<String>,
+    /// Leaves pictures out: they are most of a clip, and neither identification nor diagnosis reads them.
+    #[arg(long)]
+    no_camera: bool,
     /// How often a robot that stops itself (a reflex) is recovered without you: the arm moves again by itself then.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=20))]
     recover: u32,
@@ -55,9 +58,9 @@ struct TaskArguments {
 impl TaskArguments {
     /// `clips`: how many are asked for; else as many as are named.
     fn task(self, clips: Option<u32>, named: usize) -> Task {
-        let Self { cell, repeat, speed, out, arm, mix, realtime, recover } = self;
+        let Self { cell, repeat, speed, out, arm, mix, realtime, no_camera, recover } = self;
         let clips = clips.unwrap_or_else(|| u32::try_from(repeat.len().max(named)).unwrap_or(u32::MAX));
-        Task { cell, clips, repeat, speed, out, mix, arm, realtime, recover, domain: None }
+        Task { cell, clips, repeat, speed, out, mix, arm, realtime, no_camera, recover, domain: None }
     }
 }
 
@@ -95,14 +98,14 @@ Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops i
 recovered up to three times 2 s later, the arm goes back and the clip is repeated. One that a person stopped is left alone.
 
 Examples:
-  calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
+  calibration capture excitation --cell fr3 --clips 4 --out session
   calibration capture excitation --cell lab/cell.toml --clips 8 --out monday --arm fci://172.16.0.2 --amplitude 0.2
-  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --arm sim --motion chirp --frequency 0.2 10
-  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --arm sim --motion ramp --joints 1,4
-  calibration capture excitation --cell config/fr3_cell.toml --clips 1 --out session --arm sim --motion hold --poses 12
-  calibration capture excitation --cell config/fr3_cell.toml --out session --arm sim --repeat 0,3
-  calibration capture excitation --cell config/fr3_cell.toml --out session --arm sim --repeat 3 --speed 0.5")]
-pub(super) struct ExcitationArguments {
+  calibration capture excitation --cell fr3 --clips 1 --out session --arm sim --motion chirp --frequency 0.2 10
+  calibration capture excitation --cell fr3 --clips 1 --out session --arm sim --motion ramp --joints 1,4
+  calibration capture excitation --cell fr3 --clips 1 --out session --arm sim --motion hold --poses 12
+  calibration capture excitation --cell fr3 --out session --arm sim --repeat 0,3
+  calibration capture excitation --cell fr3 --out session --arm sim --repeat 3 --speed 0.5")]
+pub struct ExcitationArguments {
     #[command(flatten)]
     task: TaskArguments,
     /// Clips to add; with --repeat as many as it names, where nothing else is said.
@@ -198,16 +201,16 @@ Ctrl-C ends: the arm brakes, and what was recorded is kept. A robot that stops i
 recovered up to three times 2 s later, the arm goes back and the clip is repeated. One that a person stopped is left alone.
 
 Examples:
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes
+  calibration capture control-hit-slide --cell fr3 --clips 12 --out strokes
   calibration capture control-hit-slide --cell lab/cell.toml --clips 12 --out strokes --object milk_box
   calibration capture control-hit-slide --cell lab/cell.toml --clips 1 --out monday --preview next.svg
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --repeat 0,4
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --repeat 4 --clips 8
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 6 --out strokes --arm sim --speed 0.5
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --headings 8
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --turn-object 0,90,180
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --out strokes --arm sim --repeat 4 --turn-tool=-90")]
-pub(super) struct StrokeArguments {
+  calibration capture control-hit-slide --cell fr3 --out strokes --arm sim --repeat 0,4
+  calibration capture control-hit-slide --cell fr3 --out strokes --arm sim --repeat 4 --clips 8
+  calibration capture control-hit-slide --cell fr3 --clips 6 --out strokes --arm sim --speed 0.5
+  calibration capture control-hit-slide --cell fr3 --out strokes --arm sim --headings 8
+  calibration capture control-hit-slide --cell fr3 --out strokes --arm sim --turn-object 0,90,180
+  calibration capture control-hit-slide --cell fr3 --out strokes --arm sim --repeat 4 --turn-tool=-90")]
+pub struct StrokeArguments {
     #[command(flatten)]
     task: TaskArguments,
     /// Name of the object that is hit, of several in cell.toml; all others are kept clear of.
@@ -328,9 +331,9 @@ pauses, and q or Ctrl-C ends; what was taken is kept.
 
 Examples:
   calibration capture scan --cell lab/cell.toml --hand-eye hand_eye.toml --at 0.5,0,0.05 --out scan
-  calibration capture scan --cell lab/cell.toml --hand-eye hand_eye.toml --at 0.5,0,0.05 --distance 0.3 --views 60 --out scan")]
-pub(super) struct ScanArguments {
-    /// What the laboratory knows about its cell.
+  calibration capture scan --cell lab/cell.toml --hand-eye hand_eye.toml --at 0.5,0,0.05 --distance 0.6 --views 60 --out scan")]
+pub struct ScanArguments {
+    /// What the laboratory knows about its cell; `fr3` for the one that is built in.
     #[arg(long, value_name = "CELL.TOML")]
     cell: PathBuf,
     /// How the camera is mounted, as `calibration hand-eye` writes it.
@@ -343,7 +346,7 @@ pub(super) struct ScanArguments {
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = |text: &str| numbers::<3>(text, -3.0..=3.0, "m"))]
     at: [f64; 3],
     /// From the camera to it [m].
-    #[arg(long, value_name = "M", default_value_t = 0.35, value_parser = |text: &str| number(text, 0.1..=1.5, "m"))]
+    #[arg(long, value_name = "M", default_value_t = 0.5, value_parser = |text: &str| number(text, 0.1..=1.5, "m"))]
     distance: f64,
     /// What is further from --at is no part of the object: masks are cut by depth, of what stands above the table nearer
     /// than this [m] [default: a third of --distance].

@@ -1,9 +1,9 @@
 //! `calibration check`.
 
 use super::print;
+use crate::check;
+use crate::report::check::{page, words};
 use anyhow::ensure;
-use calibration::check;
-use calibration::report::check::{page, words};
 use shared_mem::console;
 use shared_mem::output::Destination;
 use shared_mem::recording::Session;
@@ -26,7 +26,7 @@ Examples:
   calibration check session
   calibration check monday --report check.html
   calibration check session/clip_03.mcap --cell cell.toml --json")]
-pub(super) struct CheckArguments {
+pub struct CheckArguments {
     /// Session folder, or one clip beside a cell.toml.
     #[arg(value_name = "SESSION")]
     session: PathBuf,

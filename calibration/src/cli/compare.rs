@@ -1,22 +1,22 @@
 //! `calibration compare`.
 
 use super::print;
-use calibration::identify::object::{self, compare};
+use crate::identify::object::{self, compare};
 use inference::interrupt::Interrupt;
 use shared_mem::output;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Four ways of finding an object's parameters from the same strokes: least squares (what `identify object` does), a
-particle swarm, CMA-ES, and gradients without the centre of mass. One table of the errors on strokes held out, one of
+Five ways of finding an object's parameters from the same strokes: least squares (what `identify object` does), the same by
+poses alone, a particle swarm, CMA-ES, and gradients without the centre of mass. One table of the errors on strokes held out, one of
 what each way cost, and how many strokes had to be simulated to come as near as the swarm did.
 
 Examples:
   calibration compare strokes
   calibration compare strokes --out comparison.json
-  calibration compare strokes --budget 2000 --parameters arm.toml --json")]
-pub(super) struct CompareArguments {
+  calibration compare strokes --points 2000 --parameters arm.toml --json")]
+pub struct CompareArguments {
     /// Session folder.
     #[arg(value_name = "SESSION")]
     session: PathBuf,
@@ -27,7 +27,7 @@ pub(super) struct CompareArguments {
     #[arg(long, value_name = "THETA.TOML")]
     parameters: Option<PathBuf>,
     /// Points that swarm and CMA-ES may try; each simulates every stroke.
-    #[arg(long, value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long = "points", alias = "budget", value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
     /// Draws the strokes that are held out, and the searches.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = inference::seed::parse)]

@@ -1,7 +1,7 @@
 //! `calibration demo`.
 
 use super::print;
-use calibration::demo;
+use crate::demo;
 use inference::interrupt::Interrupt;
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ FOLDER/diagnosis.html. Takes a minute or two.
 Examples:
   calibration demo --out demo
   calibration demo --out demo7 --seed 7 --clips 8 --json")]
-pub(super) struct DemoArguments {
+pub struct DemoArguments {
     /// Folder to create.
     #[arg(long, value_name = "FOLDER", default_value = "demo")]
     out: PathBuf,

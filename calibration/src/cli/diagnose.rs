@@ -1,10 +1,10 @@
 //! The verb `calibration diagnose`: arguments, files, and what is printed.
 
 use super::engine::{EngineArguments, heard};
-use calibration::check::gate::{self, Allowed};
-use calibration::diagnose::conclude::written;
-use calibration::diagnose::{Diagnosis, Options, diagnose_kept};
-use calibration::report;
+use crate::check::gate::{self, Allowed};
+use crate::diagnose::conclude::written;
+use crate::diagnose::{Diagnosis, Options, diagnose_kept};
+use crate::report;
 use inference::interrupt::Interrupt;
 use shared_mem::output::Destination;
 use shared_mem::recording::Session;
@@ -45,7 +45,7 @@ the limits of the cell. Of an effect that is named what to do about it in the
 cell and in a model.
 
 How far the gap shrinks is one figure, 1 - after / before of the mean squared residual on held-out clips, in units of the
-noise (docs/measuring.md). The parameters found go to --theta: `twin replay SESSION --parameters theta.toml` gives the errors of joints
+noise (docs/figures.md). The parameters found go to --theta: `twin replay SESSION --parameters theta.toml` gives the errors of joints
 and object with them. With --out alone
 they go to theta.toml beside it, unless there is one already. What no clip tells is not written.
 
@@ -60,7 +60,7 @@ Examples:
   calibration diagnose session --engine ./my_simulator
   calibration diagnose session --budget 120 --out diagnosis.json
   calibration diagnose monday --against tuesday --report changes.html")]
-pub(super) struct Arguments {
+pub struct Arguments {
     /// Folder with cell.toml and at least four different clips.
     #[arg(value_name = "SESSION")]
     pub(super) session: PathBuf,

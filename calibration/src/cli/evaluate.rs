@@ -1,9 +1,9 @@
 //! `calibration evaluate`.
 
 use super::print;
+use crate::report::evaluation::{self as report, Sheet};
+use crate::study::{self, Plan, World};
 use anyhow::{Context as _, bail};
-use calibration::report::evaluation::{self as report, Sheet};
-use calibration::study::{self, Plan, World};
 use clap::{Args, ValueEnum};
 use evaluation::findings::findings;
 use evaluation::policy::{ActionKind, Keys, Named};
@@ -28,8 +28,8 @@ Every policy meets the same starts of every task, so that what differs is seen s
 `expert:noise=METRES` (the same, way points off by so much), `ws://HOST:PORT` (served by openpi's protocol), or `FILE.onnx`
 (computed here; docs/policies.md); `NAME=` before it gives it a name of its own.
 
-Worlds: `twin` is the task file's; with --cell its arm moves under that cell's controller, with --theta as it was identified, and the
-task's object is what was identified. `nominal` is the same without --theta: does alignment matter, and by how much? FILE.csv
+Worlds: `twin` is the task file's; with --cell its arm moves under that cell's controller, with --parameters as it was identified, and the
+task's object is what was identified. `nominal` is the same without --parameters: does alignment matter, and by how much? FILE.csv
 holds trials of another world, a robot or another simulator, in columns policy, task, start, success and progress.
 
 DIR gets trials.csv, findings.json and report.html: shares with intervals, policies against each other, how far each world
@@ -37,18 +37,18 @@ predicts those of files (Pearson's correlation, mean maximum rank violation), su
 many simulated ones, and films of failures. After Ctrl-C the same command goes on.
 
 Examples:
-  calibration evaluate --policies expert expert:noise=0.005 --tasks twin/tasks/pick_carrot.toml --out carrot
-  calibration evaluate --policies mine=ws://localhost:8000 --tasks twin/tasks/push_milk.toml --episodes 200 --out mine
-  calibration evaluate --policies mine=ws://localhost:8000 --tasks twin/tasks/push_milk.toml --worlds twin,nominal,robot.csv \\
-    --cell config/fr3_cell.toml --theta theta.toml --episodes 200 --out mine
+  calibration evaluate --policies expert expert:noise=0.005 --tasks pick_carrot --out carrot
+  calibration evaluate --policies mine=ws://localhost:8000 --tasks push_milk --episodes 200 --out mine
+  calibration evaluate --policies mine=ws://localhost:8000 --tasks push_milk --worlds twin,nominal,robot.csv \\
+    --cell fr3 --parameters theta.toml --episodes 200 --out mine
 
 JSON: that of findings.json: level, cells (world, policy, task, successes, trials, success, interval, progress, smallest_difference),
 policies and worlds (pairs with difference and interval; agreement, powered), out.")]
-pub(super) struct EvaluateArguments {
+pub struct EvaluateArguments {
     /// Who acts: expert, expert:noise=METRES, ws://HOST:PORT, FILE.onnx, each also as NAME=...
     #[arg(long, value_name = "POLICY", num_args = 1.., required = true)]
     policies: Vec<Named>,
-    /// Task files.
+    /// Task files, or names of those that are built in: push_milk, stack_boxes, pick_carrot, close_laptop.
     #[arg(long, value_name = "TASK.toml", num_args = 1.., required = true)]
     tasks: Vec<PathBuf>,
     /// Where: twin, nominal, FILE.csv.
@@ -58,8 +58,8 @@ pub(super) struct EvaluateArguments {
     #[arg(long, value_name = "CELL.TOML")]
     cell: Option<PathBuf>,
     /// What was identified of that cell.
-    #[arg(long, value_name = "THETA.TOML", requires = "cell")]
-    theta: Option<PathBuf>,
+    #[arg(long, alias = "theta", value_name = "THETA.TOML", requires = "cell")]
+    parameters: Option<PathBuf>,
     /// Starts of each task.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     episodes: u64,
@@ -168,13 +168,15 @@ pub(super) fn run(arguments: &EvaluateArguments, interrupt: &Interrupt) -> anyho
 /// The simulated worlds, and the trials of the others.
 fn worlds(arguments: &EvaluateArguments, tasks: &[Task]) -> anyhow::Result<(Vec<World>, Vec<Vec<Trial>>)> {
     let cell = arguments.cell.as_deref().map(Cell::read).transpose()?;
-    let theta = arguments.theta.as_deref().map(Theta::read).transpose()?;
+    let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
     let (mut simulated, mut elsewhere) = (Vec::new(), Vec::new());
     for name in &arguments.worlds {
         let theta = match name.as_str() {
             "twin" => theta.as_ref(),
             "nominal" if theta.is_some() => None,
-            "nominal" => bail!("`nominal` is the twin without --theta, and none is given; give one, or leave it out"),
+            "nominal" => {
+                bail!("`nominal` is the twin without --parameters, and none is given; give one, or leave it out")
+            }
             file if file.ends_with(".csv") => {
                 elsewhere.push(trial::read(Path::new(file))?);
                 continue;

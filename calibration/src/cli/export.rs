@@ -28,7 +28,7 @@ Examples:
   calibration export bags --to own --out back --json
 
 JSON: clips [{file, measured, desired, poses, pictures, left_out [{topic, messages}], warnings}].")]
-pub(super) struct ExportArguments {
+pub struct ExportArguments {
     /// Session folder, or one clip.
     #[arg(value_name = "SESSION|CLIP")]
     session: PathBuf,

@@ -1,8 +1,8 @@
 //! `calibration export-episodes`.
 
 use super::print;
+use crate::demonstrations::{self, Exported, Order, Target};
 use anyhow::{Context as _, bail};
-use calibration::demonstrations::{self, Exported, Order, Target};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use shared_mem::output::OutputFolder;
@@ -19,13 +19,13 @@ picture in colour and one of depth, drawn now. Episodes that were no success are
 it is.
 
 Examples:
-  twin task twin/tasks/pick_carrot.toml --episodes 50 --record carrot
-  calibration export-episodes twin/tasks/pick_carrot.toml carrot --to lerobot --out carrot_lerobot
-  calibration export-episodes twin/tasks/pick_carrot.toml carrot --to png --every 50 --out pictures
+  twin task pick_carrot --episodes 50 --record carrot
+  calibration export-episodes pick_carrot carrot --to lerobot --out carrot_lerobot
+  calibration export-episodes pick_carrot carrot --to png --every 50 --out pictures
 
 JSON: to, out, episodes, frames, rate, features, left_out (clips).")]
-pub(super) struct ExportEpisodesArguments {
-    /// The task file that they were recorded with.
+pub struct ExportEpisodesArguments {
+    /// The task that they were recorded with: its file, or its name where it is built in.
     #[arg(value_name = "TASK.toml")]
     task: PathBuf,
     /// Clips, or folders of clips.

@@ -1,7 +1,7 @@
 //! `calibration export-model`.
 
 use super::print;
-use calibration::model::{self, Base, Format, LeftOut, Line, ModelFile};
+use crate::model::{self, Base, Format, LeftOut, Line, ModelFile};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use shared_mem::answer;
@@ -30,7 +30,7 @@ Examples:
   calibration export-model session --to mjcf --base two_arms.xml --base-joints l1,l2,l3,l4,l5,l6,l7 --out found.xml
 
 JSON: to, file, lines [{of, what, values, unit, from}], left_out [{what, why}].")]
-pub(super) struct ExportModelArguments {
+pub struct ExportModelArguments {
     /// Session folder, or a theta.toml.
     #[arg(value_name = "SESSION|THETA.TOML")]
     from: PathBuf,

@@ -22,7 +22,7 @@ Examples:
   calibration hand-eye board --board 5x7,0.034,0.028,DICT_5X5_100 --out hand_eye.toml
   calibration hand-eye session --board 5x7,0.034,0.028,DICT_5X5_100 --json
   calibration hand-eye board --board 5x7,0.034,0.028,DICT_5X5_100 --fixed-camera")]
-pub(super) struct HandEyeArguments {
+pub struct HandEyeArguments {
     /// Folder of pictures of the board, a session, or a clip.
     #[arg(value_name = "FOLDER|SESSION|CLIP")]
     target: PathBuf,

@@ -1,10 +1,10 @@
 //! `calibration identify`.
 
 use super::engine::{EngineArguments, heard};
-use super::print;
-use calibration::check::gate::{self, Allowed};
-use calibration::identify::{Identification, Optimizer, Options, arm, joint, object};
-use calibration::report::{identification, terminal};
+use super::{NoAnswer, print};
+use crate::check::gate::{self, Allowed};
+use crate::identify::{Identification, Optimizer, Options, arm, joint, object};
+use crate::report::{identification, terminal};
 use clap::{Subcommand, ValueEnum};
 use inference::interrupt::Interrupt;
 use shared_mem::output::Destination;
@@ -12,7 +12,7 @@ use shared_mem::recording::{Provenance, Session};
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
-pub(super) enum Identify {
+pub enum Identify {
     /// Stiffness and damping of every joint, and effects on request, from clips in which the arm moves.
     Arm(ArmArguments),
     /// Friction, mass, centre of mass and tip friction of the object, from clips in which the arm hits it.
@@ -70,12 +70,14 @@ know are added from the twin.
 Ctrl-C keeps what was found so far, beside --out or in the session's folder; the same command goes on from there, and ends
 where it would have ended. What no clip tells is not written.
 
+Exit code 3 where gains alone do not explain the clips: nothing is written then, and `calibration diagnose` says what else acts.
+
 Examples:
   calibration identify arm monday --out theta.toml --report page.html
   calibration identify arm monday --engine ./my_simulator --out theta.toml
   calibration identify arm monday --also command_delay,joint_coulomb_friction --out theta.toml
   calibration identify arm monday --optimizer pso --json")]
-pub(super) struct ArmArguments {
+pub struct ArmArguments {
     #[command(flatten)]
     task: Task,
     /// Effects to search besides, by the names of docs/effects.md: command_delay,rotor_inertia,payload,...
@@ -84,7 +86,7 @@ pub(super) struct ArmArguments {
     #[command(flatten)]
     engine: EngineArguments,
     /// Points that pso and cma may try.
-    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long = "points", alias = "budget", value_name = "N", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
 }
 
@@ -103,8 +105,8 @@ Examples:
   calibration identify object strokes --out theta.toml --report page.html
   calibration identify object strokes --object milk_box --out theta.toml
   calibration identify object strokes --engine ./my_simulator --out theta.toml
-  calibration identify object strokes --parameters arm.toml --optimizer pso --budget 1200 --json")]
-pub(super) struct ObjectArguments {
+  calibration identify object strokes --parameters arm.toml --optimizer pso --points 1200 --json")]
+pub struct ObjectArguments {
     #[command(flatten)]
     task: Task,
     /// Of several objects in cell.toml the one to identify [default: the one that moves].
@@ -113,7 +115,7 @@ pub(super) struct ObjectArguments {
     #[command(flatten)]
     engine: EngineArguments,
     /// Points that pso and cma may try.
-    #[arg(long, value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long = "points", alias = "budget", value_name = "N", default_value_t = 1200, value_parser = clap::value_parser!(u32).range(1..))]
     budget: u32,
 }
 
@@ -130,7 +132,7 @@ joint's <dynamics>; write it beside the URDF, whose meshes it names.
 Examples:
   calibration identify joint pushes --out laptop/identified.urdf --report hinge.html
   calibration identify joint pushes --object desk --joint rail --json")]
-pub(super) struct JointArguments {
+pub struct JointArguments {
     /// Session folder, or one clip beside a cell.toml.
     #[arg(value_name = "SESSION")]
     session: PathBuf,
@@ -236,6 +238,7 @@ impl Task {
         if let Some(page) = page {
             page.write(identification::page(&found))?;
         }
-        print(json, &found, terminal::identification(&found))
+        print(json, &found, terminal::identification(&found))?;
+        if found.is_lost() { Err(NoAnswer.into()) } else { Ok(()) }
     }
 }

@@ -1,7 +1,7 @@
 //! `calibration import`.
 
 use super::print;
-use calibration::check::motion;
+use crate::check::motion;
 use clap::Args;
 use import::{Arm, Gravity, Imported, Note, Order, Outcome, Rotors};
 use serde::Serialize;
@@ -38,7 +38,7 @@ Then: `twin replay session`, `calibration identify arm session`, `calibration di
 
 JSON: clips [{file, source, format, measured, desired, poses, left_out [{what, why, count}], warnings}], notes [{line, why,
 open, instead [line]}].")]
-pub(super) struct ImportArguments {
+pub struct ImportArguments {
     /// Logs, or folders of logs.
     #[arg(value_name = "FILES", required = true)]
     files: Vec<PathBuf>,

@@ -1,8 +1,8 @@
 //! `calibration init`.
 
 use super::print;
+use crate::init::{self, Facts, Named, Order, Written};
 use anyhow::{Context as _, bail};
-use calibration::init::{self, Facts, Named, Order, Written};
 use clap::Args;
 use rustix::termios::isatty;
 use shared_mem::answer;
@@ -30,7 +30,7 @@ Which of a URDF's joints are the arm's is found by names, limits and where the t
 base that drives, is held where it is and named. --joints says it where the URDF does not tell.
 
 JSON: file, urdf, arm [joints], held [{joint, why}], taken [{key, from}], not_known [blocks], warnings.")]
-pub(super) struct InitArguments {
+pub struct InitArguments {
     /// A built-in model: fr3.
     #[arg(long, group = "robot", value_parser = ["fr3"])]
     model: Option<String>,

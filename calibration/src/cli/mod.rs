@@ -9,6 +9,7 @@ mod demo;
 mod diagnose;
 mod engine;
 mod evaluate;
+mod example;
 mod export;
 mod export_episodes;
 mod export_model;
@@ -20,13 +21,15 @@ mod policy;
 mod sweep;
 mod viewpoint;
 
-use calibration::report::terminal;
+use crate::report::terminal;
 use clap::{Parser, Subcommand};
 use inference::interrupt::Interrupt;
 use serde::Serialize;
-use shared_mem::answer;
-use shared_mem::ending;
+use shared_mem::command_line::{self, Build};
+use shared_mem::{answer, console, ending, error_line};
 use std::fmt::Display;
+use std::process::ExitCode;
+use tracing_subscriber::EnvFilter;
 
 /// Records how a robot cell moves, and says where its twin differs.
 #[derive(Debug, Parser)]
@@ -35,7 +38,8 @@ use std::fmt::Display;
     after_help = "\
 Examples:
   calibration demo --out demo
-  calibration capture excitation --cell config/fr3_cell.toml --clips 4 --out session
+  calibration example session
+  calibration capture excitation --cell fr3 --clips 4 --out session
   calibration check session --report check.html
   calibration identify arm session --out theta.toml --report page.html
   calibration diagnose session --report report.html
@@ -44,25 +48,26 @@ Examples:
   calibration import last_week --out session
   calibration init --urdf arm.urdf --out cell.toml
   calibration export session --to rosbag2 --out bags
-  calibration export-episodes twin/tasks/pick_carrot.toml carrot --to lerobot --out carrot_lerobot
+  calibration export-episodes pick_carrot carrot --to lerobot --out carrot_lerobot
   calibration export-model theta.toml --cell cell.toml --to mjcf --out cell.xml
-  calibration evaluate --policies expert --tasks twin/tasks/pick_carrot.toml --out carrot
+  calibration evaluate --policies expert --tasks pick_carrot --out carrot
 Every verb has its own --help with an example. Logs and progress go to stderr (RUST_LOG=debug for more)."
 )]
-pub(crate) struct Arguments {
+struct Arguments {
     #[command(subcommand)]
     verb: Verb,
 }
 
+// No documentation here: the program's own help would be replaced by it.
 #[derive(Debug, Subcommand)]
-enum Verb {
+pub enum Verb {
     /// Moves the arm through a running bridge (or starts one) and records clips into a session folder.
     #[command(
         subcommand,
         after_help = "\
 Examples:
-  calibration capture excitation --cell config/fr3_cell.toml --clips 8 --out session
-  calibration capture control-hit-slide --cell config/fr3_cell.toml --clips 12 --out strokes
+  calibration capture excitation --cell fr3 --clips 8 --out session
+  calibration capture control-hit-slide --cell fr3 --clips 12 --out strokes
   calibration capture scan --cell lab/cell.toml --hand-eye hand_eye.toml --at 0.5,0,0.05 --out scan"
     )]
     Capture(capture::Capture),
@@ -104,7 +109,7 @@ Examples:
         subcommand,
         after_help = "\
 Examples:
-  calibration policy run --task twin/tasks/pick_carrot.toml --policy ws://localhost:8000 --episodes 10"
+  calibration policy run --task pick_carrot --policy ws://localhost:8000 --episodes 10"
     )]
     Policy(policy::Policy),
     /// Many runs of other verbs as units: on many cores and machines, going on after a kill, merged without gaps.
@@ -119,14 +124,40 @@ Examples:
     Sweep(sweep::Sweep),
     /// The whole story on the simulated cell: shadow, record, replay, explain.
     Demo(demo::DemoArguments),
+    /// A session to try things on, with something hidden in it.
+    Example(example::ExampleArguments),
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// One line: what happened, and what to do.
-pub(crate) fn run(arguments: Arguments) -> anyhow::Result<()> {
-    match arguments.verb {
+/// Reads the command line and does what it says.
+pub fn main(build: &Build) -> ExitCode {
+    command_line::program(build, |arguments: Arguments| run(arguments.verb))
+}
+
+/// What was said is that there is no answer: the exit code says so as well, and nothing more is said.
+#[derive(Debug, thiserror::Error)]
+#[error("no answer")]
+struct NoAnswer;
+
+/// Of [`NoAnswer`]: neither done nor failed.
+const NO_ANSWER: u8 = 3;
+
+/// Does what a verb says.
+pub fn run(verb: Verb) -> ExitCode {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_ansi(false).with_writer(|| console::Log).init();
+    match done(verb) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if error.is::<NoAnswer>() => ExitCode::from(NO_ANSWER),
+        Err(error) => {
+            console::line(format_args!("error: {}", error_line(error.as_ref())));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// One line where it fails: what happened, and what to do.
+fn done(verb: Verb) -> anyhow::Result<()> {
+    match verb {
         // What was recorded is kept and looked at, and a benchmark says what it has, after Ctrl-C too.
         Verb::Capture(capture) => capture::run(capture, &Interrupt::listen()?),
         Verb::Demo(arguments) => demo::run(arguments, &Interrupt::listen()?),
@@ -166,6 +197,7 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
         Verb::HandEye(arguments) => hand_eye::run(arguments),
         Verb::Import(arguments) => import::run(&arguments),
         Verb::Init(arguments) => init::run(*arguments),
+        Verb::Example(arguments) => example::run(arguments),
         Verb::Export(arguments) => export::run(&arguments),
         Verb::ExportEpisodes(arguments) => export_episodes::run(&arguments),
         Verb::ExportModel(arguments) => export_model::run(&arguments),
@@ -183,14 +215,15 @@ fn print(json: bool, answer: &impl Serialize, words: impl Display) -> anyhow::Re
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibration::diagnose::conclude::advice;
-    use calibration::diagnose::conclude::site::Site;
-    use shared_mem::command_line;
+    use crate::diagnose::conclude::advice;
+    use crate::diagnose::conclude::site::Site;
     use std::path::Path;
+
+    const BUILD: Build = Build { version: "0", commit: "", features: &[] };
 
     /// As the program reads it.
     fn read(command: &str) -> Result<clap::ArgMatches, clap::Error> {
-        command_line::command::<Arguments>(&crate::BUILD).try_get_matches_from(words(command))
+        command_line::command::<Arguments>(&BUILD).try_get_matches_from(words(command))
     }
 
     /// The words a POSIX shell makes of a command.

@@ -2,9 +2,9 @@
 
 use super::evaluate::AskingArguments;
 use super::print;
+use crate::acting::Robot;
 use anyhow::{Context as _, bail};
-use calibration::acting::Robot;
-use capture::recorder::Recorder;
+use capture::recorder::{Recorder, Recording};
 use clap::{Args, Subcommand};
 use evaluation::policy::{Named, Policy as Asked, Source};
 use evaluation::rollout::{self, Asking, Outcome, RunError};
@@ -24,7 +24,7 @@ use std::sync::Arc;
 use twin::task::{Run, Task};
 
 #[derive(Debug, Subcommand)]
-pub(super) enum Policy {
+pub enum Policy {
     /// Runs a policy on a task, in the twin or on the robot.
     Run(Box<RunArguments>),
 }
@@ -41,14 +41,14 @@ Free bodies are not known then, and whether it was a success is for a person to 
 puts things back.
 
 Examples:
-  calibration policy run --task twin/tasks/pick_carrot.toml --policy ws://localhost:8000 --episodes 10 --record tried
-  calibration policy run --task twin/tasks/push_milk.toml --policy ws://localhost:8000 --cell config/fr3_cell.toml --json
-  calibration policy run --task twin/tasks/pick_carrot.toml --policy act.onnx --rate 20 --chunk 10
-  calibration policy run --task twin/tasks/push_milk.toml --policy ws://localhost:8000 --robot --cell config/fr3_cell.toml --record tried
+  calibration policy run --task pick_carrot --policy ws://localhost:8000 --episodes 10 --record tried
+  calibration policy run --task push_milk --policy ws://localhost:8000 --cell fr3 --json
+  calibration policy run --task pick_carrot --policy act.onnx --rate 20 --chunk 10
+  calibration policy run --task push_milk --policy ws://localhost:8000 --robot --cell fr3 --record tried
 
 JSON: task, policy, successes, trials, and for each of episodes start, success (null on a robot), progress, duration_s, fault, missed, clip.")]
-pub(super) struct RunArguments {
-    /// Task file.
+pub struct RunArguments {
+    /// Task file, or a name of those that are built in: push_milk, stack_boxes, pick_carrot, close_laptop.
     #[arg(long, value_name = "TASK.toml")]
     task: PathBuf,
     /// Who acts: ws://HOST:PORT, FILE.onnx, expert, or expert:noise=METRES.
@@ -64,8 +64,8 @@ pub(super) struct RunArguments {
     #[arg(long, value_name = "CELL.TOML")]
     cell: Option<PathBuf>,
     /// What was identified of that cell.
-    #[arg(long, value_name = "THETA.TOML", requires = "cell", conflicts_with = "robot")]
-    theta: Option<PathBuf>,
+    #[arg(long, alias = "theta", value_name = "THETA.TOML", requires = "cell", conflicts_with = "robot")]
+    parameters: Option<PathBuf>,
     #[command(flatten)]
     asking: AskingArguments,
     /// On the robot, through the bridge that is running.
@@ -122,7 +122,7 @@ pub(super) fn run(policy: Policy, interrupt: &Interrupt) -> anyhow::Result<()> {
 
 fn in_twin(arguments: &RunArguments, task: Task, asking: &Asking, interrupt: &Interrupt) -> anyhow::Result<Vec<One>> {
     let cell = arguments.cell.as_deref().map(Cell::read).transpose()?;
-    let theta = arguments.theta.as_deref().map(Theta::read).transpose()?;
+    let theta = arguments.parameters.as_deref().map(Theta::read).transpose()?;
     let task = match &cell {
         Some(cell) => task.in_cell(cell, theta.as_ref())?.0,
         None => task,
@@ -182,7 +182,9 @@ fn cell_toml(arguments: &RunArguments, task: &Task) -> anyhow::Result<Option<Str
 
 fn on_robot(arguments: &RunArguments, task: &Task, asking: &Asking, interrupt: &Interrupt) -> anyhow::Result<One> {
     let Some(mut policy) = Asked::open(&arguments.policy.source)? else {
-        bail!("a script knows where everything stands, which nobody does on a robot; give --policy ws://HOST:PORT");
+        bail!(
+            "a scripted policy needs exact poses of all objects, so it runs only in the twin; give --policy ws://HOST:PORT"
+        );
     };
     let mut robot = Robot::find()?;
     // The folder stays as long as its place is held, and then for what is in it.
@@ -190,7 +192,11 @@ fn on_robot(arguments: &RunArguments, task: &Task, asking: &Asking, interrupt: &
         (Some(folder), Some(cell)) => {
             let place = next_clip(folder)?;
             let clip = place.path().to_owned();
-            (Some(clip.clone()), Some(Recorder::start(&clip, cell, None, interrupt)?), Some(place))
+            (
+                Some(clip.clone()),
+                Some(Recorder::start(&clip, Recording { cell, domain: None, no_camera: false }, interrupt)?),
+                Some(place),
+            )
         }
         _ => (None, None, None),
     };

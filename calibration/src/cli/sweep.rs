@@ -1,8 +1,8 @@
 //! `calibration sweep`.
 
 use super::print;
+use crate::sweep::{self, Each, Partition, Ran, Slice, TimeLimit, Wanted};
 use anyhow::Context as _;
-use calibration::sweep::{self, Each, Partition, Ran, Slice, TimeLimit, Wanted};
 use clap::{Args, Subcommand};
 use inference::interrupt::Interrupt;
 use serde_json::json;
@@ -12,7 +12,7 @@ use shared_mem::output::OutputFolder;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Subcommand)]
-pub(super) enum Sweep {
+pub enum Sweep {
     /// Writes the units of a sweep: one for each combination of values.
     Plan(PlanArguments),
     /// Runs units that have no result yet, those of one slice or all.
@@ -33,14 +33,14 @@ folder of the unit's own. --json is added. A unit's result is the JSON object th
 Its hash is that of the command, of the program's build, and of all files and folders that the command names: when one of them changes, the
 sweep has to be planned again. Files may have any size; a link counts as what it leads to, each folder once. With the line
 `benchmark --null 1 --seed {seed}`, or
-`evaluate --policies expert:noise={noise} --tasks twin/tasks/push_milk.toml --seed {seed} --out {out}`:
+`evaluate --policies expert:noise={noise} --tasks push_milk --seed {seed} --out {out}`:
 
 Examples:
   calibration sweep plan commands.txt --each seed=0..200 --out sweep
   calibration sweep plan commands.txt --each seed=0,50,100,150 --each noise=0,0.003,0.01 --out sweep
 
 JSON: out, units.")]
-pub(super) struct PlanArguments {
+pub struct PlanArguments {
     /// Commands, one a line.
     #[arg(value_name = "COMMANDS")]
     commands: PathBuf,
@@ -64,7 +64,7 @@ Examples:
   calibration sweep run sweep --slice 1/1 --jobs 4 --json
 
 JSON: units, before (had a result before), now (run now).")]
-pub(super) struct RunArguments {
+pub struct RunArguments {
     /// Folder of the sweep.
     #[arg(value_name = "SWEEP")]
     sweep: PathBuf,
@@ -86,7 +86,7 @@ Examples:
   calibration sweep local sweep --jobs 2 --json
 
 JSON: units, before (had a result before), now (run now).")]
-pub(super) struct LocalArguments {
+pub struct LocalArguments {
     /// Folder of the sweep.
     #[arg(value_name = "SWEEP")]
     sweep: PathBuf,
@@ -106,7 +106,7 @@ Examples:
   calibration sweep merge sweep --out merged
 
 JSON: out, units, seconds (of all units together), findings (of evaluations).")]
-pub(super) struct MergeArguments {
+pub struct MergeArguments {
     /// Folder of the sweep.
     #[arg(value_name = "SWEEP")]
     sweep: PathBuf,
@@ -124,7 +124,7 @@ Nodes have to see the folder of the sweep, this program, and whatever the units 
 
 Examples:
   calibration sweep slurm sweep --slices 8 --cpus 4 --time 02:00:00 > sweep.sbatch")]
-pub(super) struct SlurmArguments {
+pub struct SlurmArguments {
     /// Folder of the sweep.
     #[arg(value_name = "SWEEP")]
     sweep: PathBuf,

@@ -20,7 +20,7 @@ Examples:
   calibration viewpoint photo.jpg --joints 0,-0.78,0,-2.36,0,1.57,0.79 --cell cell.toml --start 1.4,0.8,0.9,0.26,-0.37,-0.73,0.51
   calibration viewpoint a.png b.png --joints a.json --joints b.json --mask ma.png --mask mb.png --start search --json
 A joint file is JSON: a list of positions, or an object with `q`; `K`, `D`, `width`, `height` beside it are intrinsics as ROS names them.")]
-pub(crate) struct ViewpointArguments {
+pub struct ViewpointArguments {
     /// A session folder, a clip, or pictures (png, jpg) of one camera that did not move.
     #[arg(required = true, value_name = "SESSION|CLIP|PICTURE")]
     targets: Vec<PathBuf>,

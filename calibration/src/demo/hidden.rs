@@ -25,10 +25,26 @@ const EFFECTS: [(&str, &str, [f64; 2]); 4] = [
     ("payload", "mass", [0.3, 0.6]),
 ];
 
-/// Draws an effect by `seed`.
+/// The same of strokes, on the way of the object.
+const EFFECTS_OF_STROKES: [(&str, &str, [f64; 2]); 3] = [
+    ("camera_latency", "latency", [0.015, 0.03]),
+    ("tracker_smoothing", "time_constant", [0.02, 0.05]),
+    ("velocity_dependent_friction", "slope", [0.15, 0.3]),
+];
+
+/// Draws an effect on the arm by `seed`.
 pub(super) fn effect(seed: u64) -> EffectTheta {
+    drawn(&EFFECTS, seed)
+}
+
+/// Draws an effect on an object's way by `seed`.
+pub(super) fn effect_of_strokes(seed: u64) -> EffectTheta {
+    drawn(&EFFECTS_OF_STROKES, seed)
+}
+
+fn drawn(effects: &[(&str, &str, [f64; 2])], seed: u64) -> EffectTheta {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    let (name, parameter, [lo, hi]) = EFFECTS[rng.random_range(0..EFFECTS.len())];
+    let (name, parameter, [lo, hi]) = effects[rng.random_range(0..effects.len())];
     EffectTheta { name: name.into(), parameters: [(parameter.into(), rng.random_range(lo..hi).into())].into() }
 }
 
@@ -38,14 +54,15 @@ mod tests {
 
     #[test]
     fn every_hidden_effect_is_one_that_the_simulated_cell_knows() {
-        let drawn: std::collections::BTreeSet<String> = (0..40)
-            .map(|seed| {
-                let theta = Theta { effects: vec![effect(seed)], ..Theta::default() };
+        let names = |drawn: fn(u64) -> EffectTheta| -> std::collections::BTreeSet<String> {
+            let name = |seed| {
+                let theta = Theta { effects: vec![drawn(seed)], ..Theta::default() };
                 twin::effects::Effects::from_theta(&theta.effects, 7).expect("an effect of the registry");
                 theta.effects[0].name.clone()
-            })
-            .collect();
-        assert_eq!(drawn.len(), EFFECTS.len());
+            };
+            (0..40).map(name).collect()
+        };
+        assert_eq!((names(effect).len(), names(effect_of_strokes).len()), (EFFECTS.len(), EFFECTS_OF_STROKES.len()));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //! a twin that believes cell.toml; a session is recorded and diagnosed; replayed with cell.toml and with what was found, it
 //! shows how far the gap shrinks.
 
+pub mod example;
 mod hidden;
 mod replay;
 mod stage;
@@ -255,6 +256,7 @@ fn record(
             arm: None,
             mix: false,
             realtime: None,
+            no_camera: false,
             recover: 0,
             repeat: Vec::new(),
             speed: 1.0,

@@ -185,7 +185,7 @@ fn last_line(text: &str) -> &str {
 /// Whether a line is a program's complaint and names a file of the case, the folder that they are in, or the argument that
 /// would help.
 fn names_a_file(line: &str, folder: &Path) -> bool {
-    let complains = ["twin: ", "calibration: ", "error: "].iter().any(|name| line.starts_with(name));
+    let complains = line.starts_with("error: ");
     let named = |name: &std::ffi::OsStr| line.contains(name.to_string_lossy().as_ref());
     let mut entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let session = folder.to_str().is_some_and(|folder| line.contains(folder));
