@@ -5,6 +5,7 @@ use capture::arm_motion::ArmMotion;
 use capture::rate::RATE;
 use inference::engine::Used;
 use inference::witness::Witness;
+use shared_mem::cell::Cell;
 use shared_mem::recording::SessionFiles;
 use shared_mem::theta::Theta;
 use std::collections::BTreeMap;
@@ -56,6 +57,9 @@ pub struct Diagnosis {
     pub session: String,
     /// Where its clips come from, in words.
     pub origin: String,
+    /// What the laboratory knows about its cell, for the page's picture of the robot.
+    #[serde(skip)]
+    pub cell: Cell,
     /// How it was named.
     #[serde(skip)]
     pub files: SessionFiles,

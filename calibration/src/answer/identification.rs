@@ -49,7 +49,7 @@ pub struct Identification {
     pub witnesses: usize,
     /// Root mean square residual in sigmas of the sensors' noise, at least 1.
     pub misfit: f64,
-    /// Whether the search arrived at an end.
+    /// Whether the search converged.
     pub converged: bool,
     /// Numbers that rest on a bound of their search.
     pub at_bounds: Vec<String>,
@@ -69,6 +69,21 @@ pub struct Identification {
     /// Where the parameters were written.
     #[serde(skip)]
     pub theta_file: Option<PathBuf>,
+}
+
+impl Identification {
+    /// Whether gains were searched in vain: the search did not converge, no number is identifiable, and at least half of the gap is
+    /// left in the clips that were fitted. Something else acts in them.
+    pub fn is_lost(&self) -> bool {
+        let Gap { train_before, train, .. } = &self.gap;
+        let halved = |before: Option<f64>, after: Option<f64>| before.zip(after).is_some_and(|(b, a)| a < 0.5 * b);
+        self.target == "arm"
+            && !self.converged
+            && !self.names.is_empty()
+            && self.not_identifiable.len() >= self.names.len()
+            && !halved(train_before.joint_rms_rad, train.joint_rms_rad)
+            && !halved(train_before.joint_rms_m, train.joint_rms_m)
+    }
 }
 
 /// One parameter of one or several numbers. As JSON, a single number is a number and no list.

@@ -4,6 +4,7 @@ use crate::words::parameters::{Numbers, of_joints};
 use crate::words::words;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
+use twin::effects::{Role, find};
 
 /// One number, or one a joint or axis. As JSON, `{"value", "ci90", "unit"}`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -35,10 +36,22 @@ pub(crate) fn one_or_list<T: Serialize, S: Serializer>(values: &[T], serializer:
     }
 }
 
-/// An effect with what was fitted of it: `command delay (delay 11.9 ms)`; what was held at its default is left out.
+/// An effect with what was fitted of it: `command delay (delay 11.9 ms)`, how strong it is before what form it has. What was held at its
+/// default is left out, and so is a form that may be the default as well.
 pub fn effect_in_words(effect: &str, parameters: &BTreeMap<String, Size>) -> String {
-    let fitted = parameters.iter().filter(|(_, size)| (0..size.values.len()).any(|k| size.is_fitted(k)));
-    let sizes: Vec<String> = fitted.map(|(name, size)| numbers(effect, name, size).brief()).collect();
+    let known = |name: &str| find(effect)?.parameters.iter().find(|parameter| parameter.name == name);
+    let default_of_form = |name: &str| {
+        let parameter = known(name)?;
+        matches!(parameter.role, Role::Form { .. }).then(|| parameter.resting_value())
+    };
+    let says_something = |(name, size): &(&String, &Size)| {
+        let default = default_of_form(name);
+        let differs = |k: usize| default.is_none_or(|default| !(size.ci90[k][0]..=size.ci90[k][1]).contains(&default));
+        (0..size.values.len()).any(|k| size.is_fitted(k) && differs(k))
+    };
+    let mut said: Vec<(&String, &Size)> = parameters.iter().filter(says_something).collect();
+    said.sort_by_key(|(name, _)| default_of_form(name).is_some());
+    let sizes: Vec<String> = said.into_iter().map(|(name, size)| numbers(effect, name, size).brief()).collect();
     let name = words(effect);
     if sizes.is_empty() { name } else { format!("{name} ({})", sizes.join("; ")) }
 }
@@ -70,5 +83,16 @@ mod tests {
         let parameters = BTreeMap::from([("coulomb".to_owned(), coulomb), ("creep".to_owned(), creep)]);
         let words = effect_in_words("joint_coulomb_friction", &parameters);
         assert_eq!(words, "joint coulomb friction (coulomb 0.300 N m, 0.400 N m)");
+        let payload = |centre: f64| {
+            let of = |unit: &str, values: Vec<f64>, half: f64| Size {
+                ci90: values.iter().map(|value| [value - half, value + half]).collect(),
+                values,
+                unit: unit.into(),
+            };
+            let all = [("centre", of("m", vec![centre, 0.0, 0.0], 1e-3)), ("mass", of("kg", vec![0.341], 1e-3))];
+            effect_in_words("payload", &all.map(|(name, size)| (name.to_owned(), size)).into())
+        };
+        assert_eq!(payload(1e-6), "payload (mass 0.341 kg)", "a centre that may be the flange");
+        assert!(payload(0.05).starts_with("payload (mass 0.341 kg; centre 50.0 mm"), "{}", payload(0.05));
     }
 }

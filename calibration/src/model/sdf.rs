@@ -396,7 +396,7 @@ impl File {
                 "armature",
                 "kg m^2",
                 |j| &j.armature,
-                "SDF has no rotor inertia; add it to the joint's link about its axis, as far as its engine bears it",
+                "SDF has no rotor inertia: add it to the link's inertia about the joint's axis, if the simulator stays stable",
             ),
             ("constant torque", "N m", |j| &j.constant, "SDF has no key; apply it by a plugin"),
             (

@@ -29,13 +29,14 @@ pub fn sentence(found: &Checked) -> String {
     let clips = counted(found.clips.len(), "clip");
     let (warnings_in_words, notes_in_words) = (counted(warnings, "warning"), counted(notes, "note"));
     match (wrong, warnings, notes) {
-        (0, 0, 0) => format!("nothing odd in {clips}"),
-        (0, 0, _) => format!("{notes_in_words} on {clips}; the data can mean what they say"),
-        (0, ..) => format!("{warnings_in_words} and {notes_in_words} on {clips}; the data can mean what they say"),
-        (wrong, ..) => format!(
-            "the data cannot mean what they say: {wrong} of {} remarks on {clips}; mend these first",
-            found.remarks.len()
-        ),
+        (0, 0, 0) => format!("{clips}, no problems found"),
+        (0, 0, _) => format!("{notes_in_words} on {clips}; no errors in units, order, sign or clocks"),
+        (0, ..) => {
+            format!("{warnings_in_words} and {notes_in_words} on {clips}; no errors in units, order, sign or clocks")
+        }
+        (wrong, ..) => {
+            format!("the data cannot be right: {wrong} of {} remarks on {clips}; fix these first", found.remarks.len())
+        }
     }
 }
 
@@ -62,7 +63,7 @@ pub fn words(found: &Checked) -> String {
             lines.push(format!("    size: {}", size(how_large)));
         }
         if !remark.remedy.is_empty() {
-            lines.push(format!("    mend: {}", remark.remedy));
+            lines.push(format!("    fix: {}", remark.remedy));
         }
     }
     let wide = |clip: &&ClipFacts| clip.lag.is_some_and(|lag| lag.tells_neither());
@@ -277,10 +278,10 @@ mod tests {
 
     #[test]
     fn the_terminal_ends_with_whether_the_data_can_mean_what_they_say() {
-        assert!(words(&found(Vec::new())).ends_with("nothing odd in 1 clip"));
+        assert!(words(&found(Vec::new())).ends_with("1 clip, no problems found"));
         let wrong = Remark::new(Fault::StampUnit, "a", "stamps", "ms").mended_by("ns");
         let text = words(&found(vec![wrong]));
-        assert!(text.contains("cannot be, stamp_unit: a: ms\n    mend: ns\n"), "{text}");
-        assert!(text.contains("replay: 1 of 1 clips") && text.contains("cannot mean what they say: 1 of 1"), "{text}");
+        assert!(text.contains("cannot be, stamp_unit: a: ms\n    fix: ns\n"), "{text}");
+        assert!(text.contains("replay: 1 of 1 clips") && text.contains("the data cannot be right: 1 of 1"), "{text}");
     }
 }

@@ -7,11 +7,11 @@ use crate::page::picture::picture;
 use crate::study::{Done, Plan};
 use crate::words::share::{percent, percent_interval};
 use evaluation::film::strip;
-use evaluation::findings::{CellFinding, Comparison, Findings, WorldCell, WorldPair};
+use evaluation::findings::{CellFinding, Comparison, Findings, PolicyPair, WorldCell, WorldPair};
 use evaluation::policy::Source;
 use evaluation::rollout::{Still, script};
 use maud::{Markup, html};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -29,18 +29,26 @@ pub struct Sheet<'a> {
     pub plan: &'a Plan,
 }
 
-/// The findings in one sentence.
+/// The findings in one sentence: how far one world predicts another, else which policy is better and by how much, else how often they
+/// succeed. Where the trials cannot tell, that.
 pub fn sentence(findings: &Findings) -> String {
     for pair in &findings.worlds {
         if let Some(agreement) = pair.agreement {
+            let (simulated, real) = (&pair.simulated, &pair.real);
+            let correlation = interval(agreement.pearson, agreement.pearson_interval);
+            if agreement.pearson_interval[0] <= 0.0 {
+                return format!(
+                    "Too few trials to tell how far success in {simulated} predicts that in {real}: a correlation of {correlation}."
+                );
+            }
             return format!(
-                "Success in {} predicts that in {} with a correlation of {}; the mean rank violation is {:.3}.",
-                pair.simulated,
-                pair.real,
-                interval(agreement.pearson, agreement.pearson_interval),
+                "Success in {simulated} predicts that in {real} with a correlation of {correlation}; the mean rank violation is {:.3}.",
                 agreement.rank_violation
             );
         }
+    }
+    if let Some(sentence) = better(findings) {
+        return sentence;
     }
     let shares = || findings.cells.iter().map(|cell| cell.success);
     let (low, high) = (shares().fold(f64::INFINITY, f64::min), shares().fold(f64::NEG_INFINITY, f64::max));
@@ -48,6 +56,39 @@ pub fn sentence(findings: &Findings) -> String {
         return format!("Success in {} of the trials.", percent(low));
     }
     format!("Success in {} to {} of the trials, by policy, task and world.", percent(low), percent(high))
+}
+
+/// Which policy beats which by most, where there are several.
+fn better(findings: &Findings) -> Option<String> {
+    let of = |pair: &&PolicyPair| pair.comparison.difference.abs();
+    let excludes_none = |pair: &&PolicyPair| pair.comparison.interval[0] > 0.0 || pair.comparison.interval[1] < 0.0;
+    let all = &findings.policies;
+    if all.is_empty() {
+        return None;
+    }
+    let Some(most) = all.iter().filter(excludes_none).max_by(|a, b| of(a).total_cmp(&of(b))) else {
+        return Some("Too few trials to tell the policies apart.".into());
+    };
+    let Comparison { difference, interval: [low, high], .. } = most.comparison;
+    let [first, second] = &most.policies;
+    let (winner, loser, [low, high]) =
+        if difference > 0.0 { (first, second, [low, high]) } else { (second, first, [-high, -low]) };
+    let several = all.iter().any(|pair| pair.world != most.world);
+    let world = if several { format!(" in {}", most.world) } else { String::new() };
+    let others = all.iter().filter(excludes_none).count() - 1;
+    let others = match others {
+        0 => String::new(),
+        1 => "; 1 other pair differs as well".to_owned(),
+        count => format!("; {count} other pairs differ as well"),
+    };
+    let points = |share: f64| format!("{:.0}", 100.0 * share);
+    Some(format!(
+        "{winner} beats {loser} on {}{world} by {} [{}, {}] points{others}.",
+        most.task,
+        points(difference.abs()),
+        points(low),
+        points(high)
+    ))
 }
 
 fn interval(value: f64, [low, high]: [f64; 2]) -> String {
@@ -61,7 +102,12 @@ impl Sheet<'_> {
         let body = html! {
             p.kicker { "Evaluation of policies from the same starts" }
             h1 { (unbroken(&sentence(found))) }
-            (facts(&[(trials.to_string(), "trials"), (found.cells.len().to_string(), "policies on tasks in worlds")]))
+            (facts(&[
+                (trials.to_string(), "trials"),
+                (different(found.cells.iter().map(|cell| &cell.policy)), "policies"),
+                (different(found.cells.iter().map(|cell| &cell.task)), "tasks"),
+                (different(found.cells.iter().map(|cell| &cell.world)), "worlds"),
+            ]))
             (figure("Success", "Dot and bar: share of trials and 95 % interval (Wilson).", &shares(found)))
             (self.worlds())
             (between_policies(found))
@@ -190,6 +236,11 @@ impl Sheet<'_> {
 
 fn is_of(done: &Done, cell: &CellFinding) -> bool {
     done.trial.world == cell.world && done.trial.policy == cell.policy && done.trial.task == cell.task
+}
+
+/// How many different names there are.
+fn different<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    names.collect::<BTreeSet<_>>().len().to_string()
 }
 
 fn shares(found: &Findings) -> Markup {
@@ -339,10 +390,21 @@ mod tests {
         trials.extend(robot.collect::<Vec<_>>());
         let found = findings(&trials, &["robot".to_owned()], 0);
         let page = Sheet { findings: &found, done: &done, plan: &plan }.page();
-        for text in ["worst", "predicts that in robot", "data:image/png;base64,", "milk in place at groove", "McNemar"]
-        {
+        for text in ["worst", "that in robot", "data:image/png;base64,", "milk in place at groove", "McNemar"] {
             assert!(page.contains(text), "no {text}");
         }
         assert!(words(&found, Path::new("out")).contains("4 of 4"));
+        let alone = Findings { worlds: Vec::new(), ..found };
+        assert!(sentence(&alone).starts_with("expert beats worst on push_milk"), "{}", sentence(&alone));
+        let few = Findings {
+            policies: alone
+                .policies
+                .iter()
+                .cloned()
+                .map(|pair| PolicyPair { comparison: Comparison { interval: [-0.1, 0.9], ..pair.comparison }, ..pair })
+                .collect(),
+            ..alone
+        };
+        assert!(sentence(&few).starts_with("Too few trials"));
     }
 }

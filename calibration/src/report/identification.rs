@@ -54,7 +54,11 @@ pub(super) fn sentence(found: &Identification) -> String {
     } else {
         ("held-out clips", &found.gap.holdout_before, &found.gap.holdout)
     };
-    let end = if found.converged { "" } else { "; the search did not arrive at an end" };
+    if found.is_lost() {
+        let next = found.files.command("calibration diagnose");
+        return format!("Gains alone do not explain these clips: something else acts, and `{next}` says what");
+    }
+    let end = if found.converged { "" } else { "; not converged" };
     match (size(before), size(after)) {
         (Some(before), Some(after)) => format!(
             "{known} of {all} numbers are identifiable; on {set} the twin is off by {after} instead of {before}{end}"

@@ -293,7 +293,7 @@ next clip: Play a chirp up to 10 Hz.
     calibration diagnose monday
 about command delay, in the cell: Send commands 12 ms earlier.
 about command delay, in a model: Hold them back by 12 ms.
-confidence: at most 97 %, the limit: so many such verdicts were right on simulated sessions
+confidence: 97 %, so many such verdicts were right on simulated sessions; more is never claimed
 cause named: Commands reach the robot 12 ms late <here>.";
         assert_eq!(text, expected);
     }

@@ -121,14 +121,14 @@ fn said_smallest(candidate: &Candidate) -> Option<String> {
 pub(super) fn reason(status: Status, slopes: Option<(f64, f64)>, trial: Option<&Trial>) -> String {
     let gained = trial.map(|trial| {
         let (nats, error) = (trial.change.nats, trial.change.error);
-        format!("clips are likelier by {nats:.1} nats (one sigma {error:.1}) than with the same in both sessions")
+        format!("predicts the clips by {nats:.1} \u{b1} {error:.1} nats better than the same in both sessions")
     });
     match (status, gained, slopes) {
         (Status::Named | Status::Possible, Some(gained), _) => gained,
         (Status::NotTestable, ..) => "no change of a plausible size would have been seen".into(),
         (_, Some(gained), _) => format!("{gained}: chance, or another change does better"),
-        (_, None, Some((p, _))) if p < CHANGES.max_chance => "its slopes explain far less than those of others".into(),
-        (_, None, Some((p, _))) => format!("its slopes explain no more than chance does (p = {p:.2})"),
+        (_, None, Some((p, _))) if p < CHANGES.max_chance => "another change explains far more".into(),
+        (_, None, Some((p, _))) => format!("no better than \"nothing changed\" (p = {p:.2})"),
         (_, None, None) => "it was not looked at".into(),
     }
 }

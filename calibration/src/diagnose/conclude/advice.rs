@@ -104,7 +104,7 @@ pub fn separating(effects: &[&str], site: &Site) -> Advice {
 /// What to record next to confirm what was found.
 pub fn confirming(effects: &[String], site: &Site) -> Advice {
     let effects: Vec<String> = effects.iter().map(|effect| words(effect)).collect();
-    site.again(2, |clips| format!("To confirm {}: {clips}.", effects.join(" and ")))
+    site.again(2, |clips| format!("To confirm {}, {clips}.", effects.join(" and ")))
 }
 
 /// What to record where something unknown is left.
@@ -175,7 +175,7 @@ mod tests {
             ]
         );
         let advice = confirming(&["command_delay".into(), "friction_patch".into()], &arm);
-        assert!(advice.sentence.contains("delay and friction patch: repeat two clips"), "{}", advice.sentence);
+        assert!(advice.sentence.contains("delay and friction patch, repeat two clips"), "{}", advice.sentence);
         let expected = ["--repeat 0,3", "--repeat 0 --speed 0.5", "--repeat 0 --speed 2"];
         for (command, end) in advice.commands.iter().zip(expected) {
             assert!(command.ends_with(end), "{command}");

@@ -48,10 +48,10 @@ pub(super) fn reason<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &
         (Status::RuledOut, Some((_, advantage))) => against(bench, found, judged, advantage),
         (Status::RuledOut, None) => screened(bench, found, judged),
         (_, Some((_, advantage))) => format!(
-            "predicts held-out clips better: log-likelihood higher by {}, in {:.0} % of the clips, for {}",
-            nats(advantage.nats, advantage.error),
+            "predicts {:.0} % of the held-out clips better, with {} (log-likelihood +{})",
             100.0 * advantage.share,
-            parameters(scored.cost)
+            parameters(scored.cost),
+            nats(advantage.nats, advantage.error)
         ),
         (_, None) => format!("its signature explains {:.1} % of the residuals", 100.0 * scored.cosine.powi(2)),
     };
@@ -85,7 +85,7 @@ fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>
         let fewer = if leader.scored.cost < cost { ", with fewer parameters" } else { "" };
         if ahead.nats > 0.0 {
             return format!(
-                "{other} predicts held-out clips better: log-likelihood higher by {}{fewer}",
+                "{other} predicts held-out clips better{fewer} (log-likelihood +{})",
                 nats(ahead.nats, ahead.error)
             );
         }

@@ -48,6 +48,7 @@ fn about(session: &Session, options: &Options, site: &Site, verdict: Verdict, ne
         object: session.cell.one_of_several().map(str::to_owned),
         session: session.folder.display().to_string(),
         origin: site.origin().to_owned(),
+        cell: session.cell.clone(),
         files: session.files.clone(),
         seed: options.seed,
         ..Diagnosis::default()
@@ -172,7 +173,7 @@ fn few(admitted: &Admitted, split: &Split) -> Option<String> {
     let (commands, parts) = (admitted.commands, admitted.groups.len());
     let [in_parts, in_turn] = match parts > commands {
         true => [
-            format!("their clips count in {parts} parts, each of which is called a clip here, "),
+            format!("they were cut into {parts} parts, which count as clips, "),
             format!("one in {} of them", split.in_turn.len()),
         ],
         false => [String::new(), "each".to_owned()],

@@ -39,8 +39,8 @@ use twin::arm::ArmModel;
 use twin::effects::{EffectInfo, Robot, Stage, find, registry};
 
 /// Said where a search ended with its budget or was stopped.
-const UNFINISHED: &str = "the search ended before it arrived: values and intervals are those of the place where it stopped; give more \
-                          budget, or search for what else acts";
+const UNFINISHED: &str = "not converged: values and intervals are those of the place where the search stopped; give it more budget, or \
+                          search for what else acts";
 
 /// What a clip's prediction takes from a vector of numbers.
 type Numbers<'a> = Box<dyn Fn(&[f64]) -> Theta + Sync + 'a>;
@@ -116,8 +116,11 @@ fn identify_kept(
     answer.warnings.extend(clips.warnings("another motion"));
     Used::add_remarks(&mut answer);
     answer.clips = clips.clips;
-    // Of an object nothing was found.
+    // Of an object nothing was found, and by a search that was lost nothing at all.
     let given = given.unwrap_or_default();
+    if answer.is_lost() {
+        return Ok((answer, given));
+    }
     let theta = Theta { object: given.object, others: given.others, ..settings.theta(&finding.fit.shared) };
     Ok((answer, theta))
 }

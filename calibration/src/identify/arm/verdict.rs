@@ -16,7 +16,7 @@ const LEAST_SIZE: f64 = 0.05;
 /// Estimates whose correlation is closer than this are one number (a choice).
 const ONE_NUMBER: f64 = 0.99;
 /// Of a number that is nowhere near a bound, when the search did not arrive.
-const DID_NOT_ARRIVE: &str = "the search ended before it arrived: gains alone do not explain these clips";
+const DID_NOT_ARRIVE: &str = "not converged: something other than the gains acts in these clips";
 /// An effect this near to neutral is absent, as a share of its search: rounding.
 const ABSENT_BELOW: f64 = 1e-9;
 

@@ -27,11 +27,9 @@ impl Subject {
         let articulated = || cell.objects.iter().filter(|object| object.urdf.is_some());
         let found = choose(articulated(), object, |one: &&Object| one.name.clone().unwrap_or_default(), "--object")
             .map_err(|names| match names {
-                None => {
-                    "cell.toml has no object that moves in itself; give it an [[object]] with a `name` and a `urdf` \
+                None => "cell.toml has no articulated object; give it an [[object]] with a `name` and a `urdf` \
                          (docs/cell.md)"
-                        .to_owned()
-                }
+                    .to_owned(),
                 Some(what) => format!("{what} among the objects with a `urdf` in cell.toml"),
             })?;
         let name = found.name.clone().unwrap_or_default();

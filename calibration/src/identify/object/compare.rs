@@ -247,14 +247,14 @@ impl Comparison {
             let cells: String = cells.iter().zip(&widths).map(|(cell, width)| format!("{cell:>width$}")).collect();
             let _ = writeln!(out, "{title:<COLUMN$}{cells}");
         };
-        let centimetres = |metres: f64| format!("{:.3}", metres * 1e2);
-        line(&format!("{name} on clips held out [cm]"), self.methods.iter().map(|m| m.name.clone()).collect());
+        let millimetres = |metres: f64| format!("{:.2}", metres * 1e3);
+        line(&format!("{name} on clips held out [mm]"), self.methods.iter().map(|m| m.name.clone()).collect());
         let clips = self.methods.first().map_or(&[][..], |m| &m.clips[..]);
         for (row, (file, ..)) in clips.iter().enumerate() {
-            let cell = |m: &Method| m.clips.get(row).map_or_else(String::new, |clip| centimetres(of(clip)));
+            let cell = |m: &Method| m.clips.get(row).map_or_else(String::new, |clip| millimetres(of(clip)));
             line(file, self.methods.iter().map(cell).collect());
         }
-        let means = self.methods.iter().map(|m| mean(&m.holdout).map_or_else(|| "-".into(), centimetres));
+        let means = self.methods.iter().map(|m| mean(&m.holdout).map_or_else(|| "-".into(), millimetres));
         line("mean", means.collect());
         out.push('\n');
     }
@@ -279,13 +279,13 @@ mod tests {
         let methods = vec![method("least squares", 0.0028, Some((40, 0.5))), method("particle swarm", 0.0139, None)];
         let table = Comparison { methods, fewer: Some(12.0), ..Comparison::default() }.table();
         let expected = "\
-ADD on clips held out [cm]          least squares  particle swarm
-clip_03.mcap                                0.280           1.390
-mean                                        0.280           1.390
+ADD on clips held out [mm]          least squares  particle swarm
+clip_03.mcap                                 2.80           13.90
+mean                                         2.80           13.90
 
-ADD-S on clips held out [cm]        least squares  particle swarm
-clip_03.mcap                                0.140           0.695
-mean                                        0.140           0.695
+ADD-S on clips held out [mm]        least squares  particle swarm
+clip_03.mcap                                 1.40            6.95
+mean                                         1.40            6.95
 
 what it cost                          clips        s   loss [mm]   to the swarm's loss
 least squares                           120      1.5       5.000   40 clips, 0.5 s

@@ -86,10 +86,23 @@ impl Chart<'_> {
         self.logarithmic && lo > 0.0 && hi > 10.0 * lo
     }
 
-    /// What the axis must span, in SI.
+    /// What the axis must span, in SI: what is shown, and never so little that rounding fills the picture.
     fn values(&self) -> [f64; 2] {
         let band = self.band.into_iter().flat_map(|band| [band, -band]);
-        span(self.points().map(|p| p[1]).chain(band))
+        let [lo, hi] = span(self.points().map(|p| p[1]).chain(band));
+        let room = if self.logarithmic { 0.0 } else { 0.5 * (least_span(self.unit) - (hi - lo)).max(0.0) };
+        [lo - room, hi + room]
+    }
+}
+
+/// A tenth of what matters of each quantity in a recording, in SI (choices).
+fn least_span(unit: &str) -> f64 {
+    match unit {
+        "s" => 1e-4,
+        "rad" => 1e-6,
+        "m" => 1e-5,
+        "N m" => 1e-3,
+        _ => 0.0,
     }
 }
 
@@ -152,6 +165,14 @@ mod tests {
         assert!(thinned(&points).iter().any(|p| p[1] == 7.0));
         let svg = chart(&[Line { class: "data", points: &points }]).draw().into_string();
         assert!(svg.len() < 12_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn rounding_does_not_fill_a_picture() {
+        let points: Vec<[f64; 2]> = (0..50).map(|i| [f64::from(i), 0.01 + 1e-12 * f64::from(i % 3)]).collect();
+        let lines = [Line { class: "data", points: &points }];
+        let [lo, hi] = Chart { unit: "s", band: None, ..chart(&lines) }.values();
+        assert!(hi - lo > 0.9e-4 && (0.5 * (lo + hi) - 0.01).abs() < 1e-9, "{lo} {hi}");
     }
 
     #[test]

@@ -60,6 +60,8 @@ pub(crate) fn forest(groups: &[Group]) -> Markup {
 enum Axis {
     /// Percent above the nominal value.
     Relative,
+    /// A share, always from none to all.
+    Share(Unit),
     /// The value itself.
     Absolute(Unit),
     /// The power of ten of a value that spans decades.
@@ -72,6 +74,7 @@ impl Axis {
         let [lo, hi] = span(group.rows.iter().flat_map(Row::ends));
         match relative {
             true => Self::Relative,
+            false if group.unit == "%" => Self::Share(unit(group)),
             false if lo > 0.0 && hi > DECADES * lo => Self::Logarithmic(unit(group)),
             false => Self::Absolute(unit(group)),
         }
@@ -80,7 +83,7 @@ impl Axis {
     fn place(&self, row: &Row, value: f64) -> f64 {
         match self {
             Self::Relative => 100.0 * (value / row.nominal.unwrap_or(1.0) - 1.0),
-            Self::Absolute(unit) => unit.scaled(value),
+            Self::Share(unit) | Self::Absolute(unit) => unit.scaled(value),
             Self::Logarithmic(unit) => unit.scaled(value).log10(),
         }
     }
@@ -97,8 +100,10 @@ impl Axis {
     fn title(&self) -> String {
         match self {
             Self::Relative => "difference from cell.toml [%]".into(),
-            Self::Absolute(unit) | Self::Logarithmic(unit) if unit.name().is_empty() => String::new(),
-            Self::Absolute(unit) | Self::Logarithmic(unit) => format!("[{}]", unit.name()),
+            Self::Share(unit) | Self::Absolute(unit) | Self::Logarithmic(unit) if unit.name().is_empty() => {
+                String::new()
+            }
+            Self::Share(unit) | Self::Absolute(unit) | Self::Logarithmic(unit) => format!("[{}]", unit.name()),
         }
     }
 }
@@ -114,9 +119,15 @@ fn draw_group(canvas: &mut Canvas, group: &Group, [left, top]: [f64; 2]) -> f64 
     let values = group.rows.iter().flat_map(|row| {
         row.interval.into_iter().chain([row.value]).chain(row.nominal).map(|value| axis.place(row, value))
     });
-    let [lo, hi] = span(values);
-    let room = 0.06 * (hi - lo);
-    let scale = Scale::new([lo - room, hi + room], [left, END]);
+    let [lo, hi] = match &axis {
+        Axis::Share(unit) => [unit.scaled(0.0), unit.scaled(1.0)],
+        _ => {
+            let [lo, hi] = span(values);
+            let room = 0.06 * (hi - lo);
+            [lo - room, hi + room]
+        }
+    };
+    let scale = Scale::new([lo, hi], [left, END]);
     canvas.text_within("strong", [0.0, top + 14.0], Anchor::Start, group.name, left - 10.0);
     canvas.text("small", [0.5 * (left + END), top + 14.0], Anchor::Middle, &axis.title());
     let first = top + 22.0;

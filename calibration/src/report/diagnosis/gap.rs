@@ -1,6 +1,7 @@
 //! The gap in numbers: before, after, and what noise alone leaves.
 
 use super::has_effects;
+use super::robot::robot;
 use crate::answer::diagnosis::{Diagnosis, JointGap, TorqueRms};
 use crate::page::figure::bars::{Row, bars};
 use crate::page::frame::legend;
@@ -62,6 +63,7 @@ pub(super) fn joints(diagnosis: &Diagnosis) -> Markup {
     html! {
         section {
             h2 { "Joint by joint" }
+            @if let Some(pictures) = robot(diagnosis, both) { (pictures) }
             p { "Root mean square of the residuals in a clip like most, in multiples of what noise alone leaves." }
             table {
                 tr { th { "joint" } th { "before" } @if both { th { "with what was found" } } }

@@ -2,6 +2,7 @@
 
 mod candidates;
 mod gap;
+mod robot;
 mod witnesses;
 
 pub(super) use candidates::sizes;
@@ -61,9 +62,7 @@ pub(super) fn confidence(verdict: &Verdict) -> Option<(String, &'static str)> {
     let value = probability(verdict.confidence);
     match verdict.basis() {
         Basis::Estimate => Some((value, "estimated from these clips")),
-        Basis::Limit => {
-            Some((format!("at most {value}"), "the limit: so many such verdicts were right on simulated sessions"))
-        }
+        Basis::Limit => Some((value, "so many such verdicts were right on simulated sessions; more is never claimed")),
         Basis::Rate => {
             Some((value, "so many such verdicts were right on simulated sessions; these clips are not in that figure"))
         }
@@ -264,6 +263,7 @@ pub(super) mod tests {
             seconds: 83.2,
             object: None,
             session: "my monday".into(),
+            cell: Default::default(),
             files: SessionFiles { session: "my monday".into(), cell: Some("lab/cell.toml".into()) },
             seed: 7,
             theta: Theta::default(),
@@ -279,7 +279,7 @@ pub(super) mod tests {
         let order = [
             "<h1>Commands reach the robot 12\u{a0}ms late &lt;here&gt;.</h1>",
             "96.3 [95.1, 97.2] %",
-            "at most 97 %",
+            "more is never claimed",
             "38.4 \u{3c3}\u{b2}",
             "noise alone: 1.00 \u{3c3}\u{b2}",
             "13.9 mm",
