@@ -34,8 +34,8 @@ fn each_big_dependency_has_one_door() {
         ("parry3d_f64", &["twin/src/physics/"]),
         ("urdf_rs", &["twin/src/arm/urdf.rs", "twin/src/arm/urdf/"]),
         ("quick_xml", &["twin/urdf/src/", "twin/src/xml.rs", "twin/src/xml/"]),
-        ("axum", &["twin/src/teleop/server.rs"]),
-        ("tokio", &["twin/src/teleop/server.rs"]),
+        ("axum", &["twin/src/web/", "twin/src/teleop/server.rs", "twin/src/show/server.rs"]),
+        ("tokio", &["twin/src/web/", "twin/src/teleop/server.rs"]),
         ("foxglove", &["twin/src/viewer", "shared_mem/src/recording/"]),
         ("franka", &["rt_bridge/src/fr3/", "rt_bridge/src/serve/"]),
         ("serialport", &["rt_bridge/src/gripper/robotiq/port.rs"]),
@@ -47,7 +47,10 @@ fn each_big_dependency_has_one_door() {
         ("clap_complete", &["shared_mem/src/command_line/"]),
         ("clap_mangen", &["shared_mem/src/command_line/"]),
         // Whatever asks for the commit is built again after each.
-        ("git_version", &["twin/src/main.rs", "rt_bridge/src/main.rs", "calibration/src/main.rs"]),
+        (
+            "git_version",
+            &["twin/src/main.rs", "rt_bridge/src/main.rs", "calibration/src/main.rs", "twinalign/src/main.rs"],
+        ),
         (
             "rsruckig",
             &["twin/src/arm/follower.rs", "rt_bridge/src/motion/brake.rs", "calibration/capture/src/transit.rs"],
@@ -240,8 +243,8 @@ fn modules_beside_each_other_need_each_other_in_no_circle() {
 }
 
 #[test]
-fn the_readme_names_every_folder_and_only_existing_files() {
-    let readme = std::fs::read_to_string(root().join("README.md")).expect("README.md");
+fn the_page_of_the_house_names_every_folder_and_only_existing_files() {
+    let page = std::fs::read_to_string(root().join("docs/architecture.md")).expect("docs/architecture.md");
     for folder in [
         "shared_mem/",
         "shared_mem/import/",
@@ -266,16 +269,54 @@ fn the_readme_names_every_folder_and_only_existing_files() {
         "docs/",
         "adapters/",
         "python/",
+        "twinalign/",
     ] {
-        assert!(readme.contains(folder), "README.md does not mention {folder}");
+        assert!(page.contains(&format!("`{folder}`")), "docs/architecture.md does not mention {folder}");
     }
-    let mentioned = readme.split('`').skip(1).step_by(2).filter(|code| {
+    let mentioned = page.split('`').skip(1).step_by(2).filter(|code| {
         let known = ["shared_mem/", "twin/", "rt_bridge/", "calibration/", "tests/", "config/", "docs/"];
-        known.iter().any(|start| code.starts_with(start)) && !code.contains(' ')
+        known.iter().any(|start| code.starts_with(start)) && !code.contains(' ') && !code.contains('{')
     });
     for path in mentioned {
-        assert!(root().join(path).exists(), "README.md names {path}, which does not exist");
+        assert!(root().join(path).exists(), "docs/architecture.md names {path}, which does not exist");
     }
+}
+
+/// What follows `](` of each link of a document, without those to other hosts.
+fn links(text: &str) -> Vec<&str> {
+    let targets = text.split("](").skip(1).filter_map(|rest| rest.split([')', '\n']).next());
+    targets.filter(|target| !target.contains("://") && !target.is_empty()).collect()
+}
+
+/// The anchors of a document's headings, as forges make them.
+fn anchors(text: &str) -> Vec<String> {
+    let headings = text.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    let anchor = |heading: &str| {
+        let kept = heading.to_lowercase();
+        let kept = kept.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+        kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+    };
+    headings.map(anchor).collect()
+}
+
+#[test]
+fn every_link_of_the_documents_leads_somewhere() {
+    let mut dead = Vec::new();
+    for (name, text) in tests::texts::documents() {
+        let file = root().join(&name);
+        for link in links(&text) {
+            let (path, anchor) = link.split_once('#').map_or((link, None), |(path, anchor)| (path, Some(anchor)));
+            let there = if path.is_empty() { file.clone() } else { file.with_file_name(path) };
+            let found = there.exists()
+                && anchor.is_none_or(|anchor| {
+                    std::fs::read_to_string(&there).is_ok_and(|text| anchors(&text).iter().any(|known| known == anchor))
+                });
+            if !found {
+                dead.push(format!("{name}: {link}"));
+            }
+        }
+    }
+    assert!(dead.is_empty(), "links that lead nowhere:\n{}", dead.join("\n"));
 }
 
 #[test]

@@ -72,7 +72,7 @@ fn a_clean_recording_gets_no_remark_and_is_good_for_what_its_verbs_take() {
     let missing = found["missing"].to_string();
     assert!(missing.contains("too few different commands") && missing.contains("it holds no pictures"), "{missing}");
     let page = std::fs::read_to_string(lab.path().join("check.html")).expect("the page");
-    assert!(page.contains("nothing odd in 2\u{a0}clips") && page.contains("Command against measurement"));
+    assert!(page.contains("2\u{a0}clips, no problems found") && page.contains("Command against measurement"));
 }
 
 #[test]

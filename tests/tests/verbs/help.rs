@@ -181,3 +181,21 @@ fn every_program_writes_completions_that_its_shell_reads_and_manual_pages_of_eve
     let names: Vec<String> = names.map(|name| name.into_string().expect("UTF-8")).collect();
     assert!(names.len() > 30 && !names.iter().any(|name| name.contains("help")), "{names:?}");
 }
+
+/// The verbs in the help of a program.
+fn verbs_of(program: &str) -> std::collections::BTreeSet<String> {
+    let text = help(program, &[]);
+    let commands = text.split_once("\nCommands:\n").map_or("", |(_, rest)| rest);
+    let names = commands.lines().take_while(|line| !line.is_empty()).filter(|line| !line.starts_with("   "));
+    names.filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect()
+}
+
+#[test]
+fn one_program_holds_the_verbs_of_all() {
+    let all = PROGRAMS.iter().flat_map(|program| verbs_of(program)).collect::<std::collections::BTreeSet<_>>();
+    assert_eq!(verbs_of("twinalign"), all);
+    assert!(help("twinalign", &["stop".into()]).contains("Brake the arm of a running bridge now"));
+    let completions = run("twinalign", &["completions".into(), "bash".into()]);
+    let script = String::from_utf8_lossy(&completions.stdout).into_owned();
+    assert!(completions.status.success() && script.contains("diagnose") && script.contains("doctor"));
+}
