@@ -1,7 +1,7 @@
 //! `calibration export-model`.
 
 use super::print;
-use crate::model::{self, Base, Format, LeftOut, Line, ModelFile};
+use crate::model::{self, Base, Format, LeftOut, Line, Look, ModelFile};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use shared_mem::answer;
@@ -26,6 +26,7 @@ Examples:
   calibration export-model session --to mjcf --out cell.xml
   calibration export-model theta.toml --cell cell.toml --to urdf --out arm.urdf
   calibration export-model session --parameters theta.toml --to sdf --out world.sdf --json
+  calibration export-model session --to mjcf --meshes meshes --out cell.xml
   calibration export-model session --to mjcf --base lab.xml --out lab_found.xml
   calibration export-model session --to mjcf --base two_arms.xml --base-joints l1,l2,l3,l4,l5,l6,l7 --out found.xml
 
@@ -50,6 +51,10 @@ pub struct ExportModelArguments {
     /// Joints of --base that are the cell's, from base to flange [default: those of the same names].
     #[arg(long, requires = "base", value_name = "NAME,...", value_delimiter = ',')]
     base_joints: Vec<String>,
+    /// Puts the arm's shape into this folder, an STL for every visible part, and shows it in the model: in MJCF with light, floor and a
+    /// keyframe `home`.
+    #[arg(long, value_name = "DIR", conflicts_with = "base", requires = "out")]
+    meshes: Option<PathBuf>,
     /// Where the model goes [default: standard output].
     #[arg(long, value_name = "MODEL")]
     out: Option<PathBuf>,
@@ -82,7 +87,11 @@ struct Answer<'a> {
 }
 
 pub(super) fn run(arguments: &ExportModelArguments) -> anyhow::Result<()> {
-    let ExportModelArguments { from, cell, parameters, to, base, base_joints, out, force, json } = arguments;
+    let ExportModelArguments { from, cell, parameters, to, base, base_joints, meshes, out, force, json } = arguments;
+    anyhow::ensure!(
+        meshes.is_none() || !matches!(to, Target::Sdf),
+        "--meshes shows the arm in MJCF and URDF; give --to mjcf, or leave --meshes out"
+    );
     let place = Destination::of(out.as_deref(), *force)?;
     let is_session = from.is_dir();
     let folder = if is_session { from.as_path() } else { from.parent().unwrap_or(Path::new("")) };
@@ -110,7 +119,12 @@ pub(super) fn run(arguments: &ExportModelArguments) -> anyhow::Result<()> {
     let base = base.as_deref().map(|file| Base { file, joints: base_joints, out: out.as_deref() });
     let ModelFile { text, lines, left_out } = match &base {
         Some(base) => model::write_into(&cell, &theta, format, base)?,
-        None => model::write(&cell, &theta, format)?,
+        None => {
+            let of = |folder: &PathBuf| Look::of(&cell, folder, out.as_deref().unwrap_or(Path::new("")));
+            let look = meshes.as_ref().map(of).transpose()?;
+            look.as_ref().map_or(Ok(()), Look::write)?;
+            model::write(&cell, &theta, format, look)?
+        }
     };
     let Some(place) = place else {
         left_out.iter().for_each(|LeftOut { what, why }| console::line(format_args!("left out: {what}: {why}")));

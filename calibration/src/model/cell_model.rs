@@ -2,6 +2,7 @@
 //! The writers of the formats read this and nothing else.
 
 use super::known::{Known, LeftOut};
+use super::look::Look;
 use nalgebra::{Isometry3, Vector3};
 use shared_mem::cell::{Camera, Cell, ControllerKind, GRAVITY, Tool};
 use shared_mem::theta::{EffectTheta, Theta};
@@ -13,6 +14,8 @@ use twin::physics::hit::ContactMotion;
 use twin::scene::{ObjectModel, ObjectShape};
 
 pub(super) const CELL: &str = "cell.toml";
+/// Of numbers that nobody has identified or weighed.
+const UNMEASURED: &str = "no measurement (the middle of its range in cell.toml, or a usual value)";
 pub(super) const THETA: &str = "theta.toml";
 
 /// Everything that goes into a model file.
@@ -25,6 +28,8 @@ pub(super) struct CellModel {
     pub(super) camera: Option<CameraModel>,
     /// How much older a tracked pose is than its stamp [s].
     pub(super) latency: Known,
+    /// What it looks like, where it is to be seen.
+    pub(super) look: Option<Look>,
     /// What no format holds.
     pub(super) beyond: Vec<LeftOut>,
 }
@@ -123,6 +128,7 @@ impl CellModel {
                 Some(camera) if camera.latency > 0.0 => Known::new(camera.latency, CELL),
                 _ => Known::default(),
             },
+            look: None,
             beyond: Vec::new(),
         };
         let stated = twin::effects::stated(cell.controller.as_ref());
@@ -282,7 +288,20 @@ impl Object {
         let Some(model) = ObjectModel::new(cell, Some(theta))? else { return Ok(None) };
         model.check()?;
         let found = theta.object.clone().unwrap_or_default();
-        let of = |value: f64, found: bool| Known::new(value, if found { THETA } else { CELL });
+        let stated = |value: f64, found: bool, weighed: bool| {
+            Known::new(
+                value,
+                if found {
+                    THETA
+                } else if weighed {
+                    CELL
+                } else {
+                    UNMEASURED
+                },
+            )
+        };
+        let of = |value: f64, found: bool| stated(value, found, false);
+        let weighed = cell.object().is_some_and(|object| object.mass.is_some());
         let law = effects.hit.real_law(ContactLaw::nominal(model.tip_friction));
         let centre = found.centre_of_mass.is_some();
         let outline = Outline::of(&model, &effects.material(model.parameters()))?;
@@ -291,9 +310,9 @@ impl Object {
                 ObjectShape::Box { half_extents } => Some(*half_extents),
                 ObjectShape::Mesh { .. } => None,
             },
-            mass: of(model.mass, found.mass.is_some()),
+            mass: stated(model.mass, found.mass.is_some(), weighed),
             centre_of_mass: [0, 1, 2].map(|i| of(model.centre_of_mass[i], centre)),
-            inertia: of(outline.inertia[(2, 2)], found.mass.is_some()),
+            inertia: stated(outline.inertia[(2, 2)], found.mass.is_some(), weighed),
             friction: [of(model.friction, found.friction.is_some()), of(model.friction, found.friction.is_some())],
             tip_friction: of(law.friction, found.tip_friction.is_some()),
             reach: Known::new(1.0, CELL),

@@ -1,6 +1,7 @@
 //! MuJoCo: the cell as one MJCF file that loads as it stands, its elements named as in the robot's own model.
 
 mod arm;
+mod look;
 mod scene;
 
 use super::cell_model::CellModel;
@@ -26,6 +27,7 @@ pub(super) fn write(model: &CellModel) -> Sheet {
     file.sheet.xml.close();
     file.meshes(model);
     file.sheet.xml.open("worldbody", &[]);
+    file.light(model);
     if let Some(height) = model.table {
         file.sheet.xml.comment("the table's surface [m], from cell.toml");
         file.sheet.xml.leaf(
@@ -39,7 +41,8 @@ pub(super) fn write(model: &CellModel) -> Sheet {
         );
     }
     if let Some(arm) = &model.arm {
-        file.arm(arm);
+        file.shapes(model, 0);
+        file.arm(arm, model);
     }
     if let Some(object) = &model.object {
         file.object(object, model.table.unwrap_or(0.0));
@@ -53,6 +56,7 @@ pub(super) fn write(model: &CellModel) -> Sheet {
         file.actuators(arm);
     }
     file.sensors(model);
+    file.home(model);
     file.sheet
 }
 

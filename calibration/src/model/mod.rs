@@ -8,6 +8,7 @@
 mod base;
 mod cell_model;
 mod known;
+mod look;
 mod mjcf;
 mod sdf;
 mod sheet;
@@ -15,6 +16,7 @@ mod urdf;
 
 pub use base::Base;
 pub use known::{LeftOut, Line};
+pub use look::Look;
 
 use cell_model::CellModel;
 use shared_mem::cell::Cell;
@@ -40,12 +42,12 @@ pub struct ModelFile {
     pub left_out: Vec<LeftOut>,
 }
 
-/// The model of `cell` with what `theta` knows.
+/// The model of `cell` with what `theta` knows; with `look` it can be seen (an SDF stays as it is).
 ///
 /// # Errors
 /// Robot, mesh or effect that cannot be used; one line with the remedy.
-pub fn write(cell: &Cell, theta: &Theta, format: Format) -> anyhow::Result<ModelFile> {
-    Ok(written(CellModel::of(cell, theta)?, format))
+pub fn write(cell: &Cell, theta: &Theta, format: Format, look: Option<Look>) -> anyhow::Result<ModelFile> {
+    Ok(written(CellModel { look, ..CellModel::of(cell, theta)? }, format))
 }
 
 /// The user's own model, in the same format, with what is known of the cell.

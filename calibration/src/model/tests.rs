@@ -21,7 +21,7 @@ const FORMATS: [Format; 3] = [Format::Mjcf, Format::Urdf, Format::Sdf];
 #[test]
 fn an_urdf_that_is_written_is_the_arm_that_it_was_written_from() {
     let (mut cell, folder) = (shipped(), tempfile::tempdir().expect("a folder"));
-    let file = write(&cell, &Theta::default(), Format::Urdf).expect("a model");
+    let file = write(&cell, &Theta::default(), Format::Urdf, None).expect("a model");
     std::fs::write(folder.path().join("arm.urdf"), &file.text).expect("room");
     let before = ArmModel::from_cell(&cell).expect("the arm");
     cell.robot = Some(shared_mem::cell::Robot { urdf: Some("arm.urdf".into()), ..Default::default() });
@@ -53,8 +53,8 @@ fn every_effect_stands_in_the_file_or_is_named_among_what_it_lacks() {
         // A cell of which next to nothing is known drops none either.
         let bounded = Cell { camera: None, objects: Vec::new(), tool: None, ..shipped() };
         for (cell, format) in FORMATS.iter().flat_map(|format| [(shipped(), *format), (bounded.clone(), *format)]) {
-            let file = write(&cell, &theta(&block), format).expect("a model");
-            let bare = write(&cell, &Theta::default(), format).expect("a model");
+            let file = write(&cell, &theta(&block), format, None).expect("a model");
+            let bare = write(&cell, &Theta::default(), format, None).expect("a model");
             let named = file.lines.iter().any(|line| line.from.iter().any(|from| from.contains(effect.name)));
             let lacks =
                 file.left_out.iter().any(|left| left.what.contains(effect.name)) || file.left_out != bare.left_out;
@@ -75,7 +75,7 @@ fn numbers_of_joints_are_sums_of_what_is_stated_and_what_was_found() {
          [[effect]]\nname = \"rotor_inertia\"\nextra = 0.1\n[[effect]]\nname = \"command_delay\"\ndelay = 0.012\n\
          [[effect]]\nname = \"torque_gain\"\ngain = 0.9\n",
     );
-    let text = write(&shipped(), &found, Format::Mjcf).expect("a model").text;
+    let text = write(&shipped(), &found, Format::Mjcf, None).expect("a model").text;
     assert!(text.contains("armature=\"0.295\"") && text.contains("armature=\"0.174\""), "{text}");
     assert!(
         text.contains("kp=\"549\"") && text.contains("delay=\"0.012\"") && text.contains("gravcomp=\"0.9\""),
@@ -91,7 +91,7 @@ fn a_law_that_is_given_no_desired_velocity_has_no_actuator_for_it() {
     let actuators = |kind: ControllerKind| {
         let mut cell = shipped();
         cell.controller.as_mut().expect("a controller").kind = kind;
-        let text = write(&cell, &Theta::default(), Format::Mjcf).expect("a model").text;
+        let text = write(&cell, &Theta::default(), Format::Mjcf, None).expect("a model").text;
         [text.contains("fr3_joint1_velocity"), text.contains("gravcomp=\"1\""), text.contains("kp=\"600\" kv=\"50\"")]
     };
     assert_eq!(actuators(ControllerKind::JointImpedance), [true, true, false]);
@@ -107,7 +107,7 @@ fn a_joint_of_any_name_makes_no_other_element() {
     );
     let cell = Cell::parse(&text, Path::new("cell.toml")).expect("a cell");
     for format in FORMATS {
-        let file = write(&cell, &Theta::default(), format).expect("a model");
+        let file = write(&cell, &Theta::default(), format, None).expect("a model");
         assert!(!file.text.contains("<joint name='b'"), "{}", file.text);
         assert_eq!(file.text.matches("<!--").count(), file.text.matches("-->").count(), "{}", file.text);
     }

@@ -11,7 +11,7 @@ pub(super) fn write(model: &CellModel) -> Sheet {
     let mut file = File { sheet: Sheet::new() };
     file.sheet.xml.open("robot", &[("name", "cell".into())]);
     if let Some(arm) = &model.arm {
-        file.arm(arm);
+        file.arm(arm, model);
         file.lacks_of_arm(arm);
     }
     if let Some(camera) = &model.camera {
@@ -43,14 +43,15 @@ fn origin(at: &Isometry3<f64>) -> [(&'static str, String); 2] {
 }
 
 impl File {
-    fn arm(&mut self, arm: &Arm) {
-        self.sheet.xml.leaf("link", &[("name", arm.base_frame.clone())]);
+    fn arm(&mut self, arm: &Arm, model: &CellModel) {
+        let nothing = MassProperties::default();
+        self.link(&arm.base_frame, &nothing, model, Some(0));
         let mut before = arm.base_frame.as_str();
-        for joint in &arm.joints {
+        for (place, joint) in arm.joints.iter().enumerate() {
             // Where only names are known, each joint stands for itself.
             let parent = if arm.has_geometry { before } else { arm.base_frame.as_str() };
             self.joint(joint, parent);
-            self.link(&joint.part.link, &joint.part.body);
+            self.link(&joint.part.link, &joint.part.body, model, Some(place + 1));
             before = &joint.part.link;
         }
         if !arm.has_geometry {
@@ -71,7 +72,7 @@ impl File {
             self.fixed("tool_joint", "flange", "tool", &Isometry3::translation(at.x, at.y, at.z));
             let properties = MassProperties::of_tool(tool);
             let centre = properties.centre + at * (arm.carried - 1.0);
-            self.link("tool", &MassProperties { centre, ..properties });
+            self.link("tool", &MassProperties { centre, ..properties }, model, Some(arm.joints.len() + 1));
         }
         for load in &arm.loads {
             let name = load.name.as_str();
@@ -80,7 +81,8 @@ impl File {
                 .note("mass", Line::new(name, "a load that the controller does not compensate", "kg", &load.mass));
             self.sheet.xml.comment(&format!("{name} {comment}; origin [m] in the flange frame"));
             self.fixed(&format!("{name}_joint"), "flange", name, &Isometry3::identity());
-            self.link(name, &MassProperties::new(load.mass.value, load.centre, [1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0]));
+            let point = MassProperties::new(load.mass.value, load.centre, [1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0]);
+            self.link(name, &point, model, None);
         }
     }
 
@@ -92,7 +94,8 @@ impl File {
         self.sheet.xml.close();
     }
 
-    fn link(&mut self, name: &str, body: &MassProperties) {
+    /// A link, with what is seen on it where that has a place among the arm's.
+    fn link(&mut self, name: &str, body: &MassProperties, model: &CellModel, place: Option<usize>) {
         self.sheet.xml.open("link", &[("name", name.into())]);
         if body.mass > 0.0 || body.inertia.norm() > 0.0 {
             let body = body.with_moments_from(LEAST_MOMENT);
@@ -113,6 +116,17 @@ impl File {
                     ("iyz", i(1, 2)),
                 ],
             );
+            self.sheet.xml.close();
+        }
+        for part in place.into_iter().flat_map(|place| model.look.iter().flat_map(move |look| look.on(place))) {
+            self.sheet.xml.open("visual", &[]);
+            self.sheet.xml.leaf("origin", &origin(&part.in_link));
+            self.sheet.xml.open("geometry", &[]);
+            self.sheet.xml.leaf("mesh", &[("filename", part.file.clone())]);
+            self.sheet.xml.close();
+            self.sheet.xml.open("material", &[("name", part.name.clone())]);
+            self.sheet.xml.leaf("color", &[("rgba", numbers(part.rgba()))]);
+            self.sheet.xml.close();
             self.sheet.xml.close();
         }
         self.sheet.xml.close();

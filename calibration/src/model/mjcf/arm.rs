@@ -1,6 +1,6 @@
 //! The arm in MJCF: bodies, joints, tool and loads, and the actuators that are the controller.
 
-use super::super::cell_model::{Arm, Joint};
+use super::super::cell_model::{Arm, CellModel, Joint};
 use super::super::known::{LEAST_MOMENT, Line, number, numbers};
 use super::{File, STEP, full, place};
 use nalgebra::Vector3;
@@ -12,7 +12,7 @@ const FRICTION_IMPEDANCE: f64 = 0.5;
 const LEAST_MASS: f64 = 1e-6;
 
 impl File {
-    pub(super) fn arm(&mut self, arm: &Arm) {
+    pub(super) fn arm(&mut self, arm: &Arm, model: &CellModel) {
         let compensated =
             if arm.compensates { arm.joints.iter().map(|j| j.torque_gain.value).fold(f64::NAN, f64::min) } else { 0.0 };
         if arm.compensates && arm.joints.iter().any(|joint| (joint.torque_gain.value - compensated).abs() > 1e-9) {
@@ -27,7 +27,7 @@ impl File {
                 "MJCF compensates gravity alone: add them as qfrc_applied, as docs/export_model.md does",
             );
         }
-        for joint in &arm.joints {
+        for (i, joint) in arm.joints.iter().enumerate() {
             let mut body = vec![("name", joint.part.link.clone())];
             body.extend(place(&joint.part.origin));
             if arm.compensates {
@@ -37,6 +37,7 @@ impl File {
             self.sheet.xml.open("body", &body);
             self.inertial(&joint.part.body, arm.has_geometry);
             self.joint(joint, arm.compensates);
+            self.shapes(model, i + 1);
             if !arm.has_geometry {
                 self.sheet.xml.close();
             }
@@ -167,8 +168,19 @@ impl File {
         self.sheet.xml.close();
     }
 
+    /// What holds the arm at `q`: one number for every actuator, in their order.
+    pub(super) fn controls(arm: &Arm, q: &[f64]) -> Vec<f64> {
+        let mut controls = Vec::new();
+        if has_gains(arm) {
+            controls.extend(q);
+            controls.extend(arm.follows_velocity.then(|| vec![0.0; q.len()]).into_iter().flatten());
+        }
+        controls.extend(arm.joints.iter().filter(|joint| joint.constant.is_known()).map(|_| 0.0));
+        controls
+    }
+
     pub(super) fn actuators(&mut self, arm: &Arm) {
-        let gains = arm.joints.iter().all(|joint| joint.stiffness.is_known() && joint.gain_damping.is_known());
+        let gains = has_gains(arm);
         if !gains && arm.joints.iter().all(|joint| !joint.constant.is_known()) {
             return;
         }
@@ -273,4 +285,9 @@ impl File {
         attributes.extend(way.iter().cloned());
         self.sheet.xml.leaf(if lag.is_some() { "general" } else { "velocity" }, &attributes);
     }
+}
+
+/// Whether the controller's law is known.
+fn has_gains(arm: &Arm) -> bool {
+    arm.joints.iter().all(|joint| joint.stiffness.is_known() && joint.gain_damping.is_known())
 }

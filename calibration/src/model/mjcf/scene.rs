@@ -5,6 +5,8 @@ use super::super::known::{Line, number, numbers};
 use super::{File, STEP, full, quaternion};
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// Where the object stands on the table, for whoever uses the file to change [m].
+pub(super) const OBJECT_AT: [f64; 2] = [0.5, 0.0];
 /// Radius of the spheres on which the object stands [m].
 const FOOT: f64 = 5e-4;
 /// `solimp` of contacts: as hard as the solver stays calm with.
@@ -14,11 +16,17 @@ const FOOT_TIME: f64 = 2e-3;
 
 impl File {
     pub(super) fn meshes(&mut self, model: &CellModel) {
-        let Some(object) = model.object.as_ref().filter(|object| object.half_extents.is_none()) else { return };
-        let corners = object.outline.corners.iter().flat_map(|corner| corner.iter().copied());
+        let hull = model.object.as_ref().filter(|object| object.half_extents.is_none());
+        if hull.is_none() && model.look.is_none() {
+            return;
+        }
         self.sheet.xml.open("asset", &[]);
-        self.sheet.xml.comment("convex hull of the object's mesh around its geometric centre [m], from cell.toml");
-        self.sheet.xml.leaf("mesh", &[("name", "object".into()), ("vertex", numbers(corners))]);
+        if let Some(object) = hull {
+            let corners = object.outline.corners.iter().flat_map(|corner| corner.iter().copied());
+            self.sheet.xml.comment("convex hull of the object's mesh around its geometric centre [m], from cell.toml");
+            self.sheet.xml.leaf("mesh", &[("name", "object".into()), ("vertex", numbers(corners))]);
+        }
+        self.files_of_shapes(model);
         self.sheet.xml.close();
     }
 
@@ -44,7 +52,10 @@ impl File {
         self.sheet
             .xml
             .comment("the object; its frame is its geometric centre, and its place here is for you to choose");
-        self.sheet.xml.open("body", &[("name", "object".into()), ("pos", numbers([0.5, 0.0, table + outline.depth]))]);
+        self.sheet.xml.open(
+            "body",
+            &[("name", "object".into()), ("pos", numbers([OBJECT_AT[0], OBJECT_AT[1], table + outline.depth]))],
+        );
         self.sheet.xml.leaf("freejoint", &[("name", "object".into())]);
         lines.iter().for_each(|line| self.sheet.xml.comment(line));
         self.sheet.xml.leaf(
