@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, UnitQuaternion
 use shared_mem::cell::{Cell, Robot};
 use shared_mem::recording::RigidPose;
 
-/// What is held fast, and the colours of all other bodies in turn.
+/// Where the task file gives none: what is held fast, and all other bodies in turn.
 const FIXED: [u8; 3] = [196, 190, 180];
 const COLOURS: [[u8; 3]; 8] = [
     [214, 96, 77],
@@ -22,6 +22,10 @@ const COLOURS: [[u8; 3]; 8] = [
     [200, 200, 80],
     [240, 240, 240],
 ];
+
+/// Share of a picture within which lies what it is widened for.
+#[cfg(feature = "teleop")]
+const WITHIN: f64 = 0.9;
 
 /// A camera of a task, in the world: z forward, x right, y down; a pinhole with square pixels around the picture's middle.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +68,24 @@ impl TaskCamera {
             world_from_camera: Isometry3::from_parts(place.into(), UnitQuaternion::from_rotation_matrix(&turn)),
         })
     }
+
+    /// The same view in whole times as many pixels, the fewest that make at least so many columns.
+    #[cfg(feature = "teleop")]
+    pub(crate) fn finer_to(&self, columns: u32) -> Self {
+        let times = columns.div_ceil(self.size[0]);
+        Self { size: self.size.map(|pixels| pixels * times), focal: self.focal * f64::from(times), ..self.clone() }
+    }
+
+    /// The same view, wide enough that all these points in front of it are in the picture; world frame.
+    #[cfg(feature = "teleop")]
+    pub(crate) fn seeing(&self, points: impl IntoIterator<Item = Point3<f64>>) -> Self {
+        let camera_from_world = self.world_from_camera.inverse();
+        let half = self.size.map(|pixels| 0.5 * WITHIN * f64::from(pixels));
+        let widest = points.into_iter().map(|point| camera_from_world * point).filter(|p| p.z > 0.0);
+        let focal =
+            widest.fold(self.focal, |focal, p| focal.min(half[0] * p.z / p.x.abs()).min(half[1] * p.z / p.y.abs()));
+        Self { focal, ..self.clone() }
+    }
 }
 
 /// A picture of a task.
@@ -101,7 +123,7 @@ impl Task {
         let light = (camera_from_world.rotation * Vector3::from(looks::LIGHT)).cast::<f32>();
         let mut pieces = Vec::new();
         for (i, body) in self.bodies.iter().enumerate() {
-            let colour = colour(i, body);
+            let colour = self.colours.get(i).copied().flatten().unwrap_or_else(|| usual(i, body));
             pieces.extend(body.pieces.iter().map(|piece| (mesh(&piece.hull, colour), i, piece.at)));
         }
         let raster = Raster::new(width as usize, height as usize, pinhole, light);
@@ -146,7 +168,8 @@ fn fr3() -> Robot {
     Robot { model: Some("fr3".into()), ..Robot::default() }
 }
 
-fn colour(place: usize, body: &BodyPlan) -> [u8; 3] {
+/// The colour of a body that the file gives none.
+fn usual(place: usize, body: &BodyPlan) -> [u8; 3] {
     if matches!(body.hold, Hold::Fixed(_)) { FIXED } else { COLOURS[place % COLOURS.len()] }
 }
 
@@ -156,7 +179,7 @@ fn mesh(hull: &Hull, colour: [u8; 3]) -> Mesh {
     Mesh::new((hull.corners.clone(), hull.faces.iter().flat_map(|face| fan(&face.rim)).collect()), colour)
 }
 
-fn isometry(pose: &RigidPose) -> Isometry3<f64> {
+pub(super) fn isometry(pose: &RigidPose) -> Isometry3<f64> {
     let [w, i, j, k] = pose.wxyz;
     Isometry3::from_parts(
         Point3::from(pose.position).into(),
@@ -218,6 +241,37 @@ field_of_view = 0.9
         // Beyond the table there is nothing.
         assert_eq!((picture.depth[50 * 401], colour(50 * 401)), (0, &looks::BACKGROUND[..]));
     }
+    #[test]
+    fn a_body_has_the_colour_that_its_file_gives_it() {
+        let text = TASK.replace("name = \"box\"", "name = \"box\"\ncolour = [255, 0, 0]");
+        let task = parse(&text, Path::new("task.toml")).expect("a task");
+        let poses: Vec<RigidPose> = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.05]]
+            .map(|position| RigidPose { position, wxyz: [1.0, 0.0, 0.0, 0.0] })
+            .into();
+        let picture = task.view(&task.cameras()[0]).draw(&poses, None);
+        let middle = 3 * (50 * 401 + 200);
+        assert!(picture.colour[middle] > 0 && picture.colour[middle + 1..middle + 3] == [0, 0]);
+        for bad in ["[256, 0, 0]", "[1, 2]", "\"red\""] {
+            assert!(parse(&text.replace("[255, 0, 0]", bad), Path::new("task.toml")).is_err(), "{bad}");
+        }
+    }
+
+    #[cfg(feature = "teleop")]
+    #[test]
+    fn a_view_that_is_widened_has_every_point_in_it_and_one_that_is_finer_the_same() {
+        let task = parse(TASK, Path::new("task.toml")).expect("a task");
+        let camera = &task.cameras()[0];
+        let finer = camera.finer_to(640);
+        assert_eq!((finer.size, finer.focal), ([802, 202], 2.0 * camera.focal));
+        let inside = [Point3::new(0.05, 0.1, 0.0)];
+        assert_eq!(camera.seeing(inside), *camera);
+        let far = Point3::new(0.9, -0.1, 0.3);
+        let wide = camera.seeing([inside[0], far]);
+        let seen = wide.world_from_camera.inverse() * far;
+        let [x, y] = [seen.x, seen.y].map(|along| (along / seen.z * wide.focal).abs());
+        assert!(x <= 200.5 + 1e-9 && y <= 50.5 + 1e-9 && wide.focal < camera.focal);
+    }
+
     #[test]
     fn the_arm_is_seen_where_its_joints_have_it() {
         let (head, camera) = TASK.split_once("[[camera]]").expect("a camera");

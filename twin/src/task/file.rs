@@ -44,6 +44,7 @@ pub(super) struct BodyEntry {
     pub(super) friction: f64,
     #[serde(default)]
     pub(super) pad_radius: f64,
+    pub(super) colour: Option<[u8; 3]>,
     #[serde(default)]
     pub(super) position: [f64; 3],
     #[serde(default)]

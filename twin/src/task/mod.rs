@@ -57,6 +57,10 @@ use cell::TaskCell;
 use condition::Condition;
 use gripper::Gripper;
 use motion::Motions;
+#[cfg(feature = "teleop")]
+use nalgebra::Point3;
+#[cfg(feature = "teleop")]
+use shared_mem::recording::RigidPose;
 use shared_mem::toml_file::TomlFileError;
 use start::StartRange;
 use std::path::Path;
@@ -71,6 +75,8 @@ pub struct Task {
     /// The whole file.
     text: String,
     bodies: Vec<BodyPlan>,
+    /// Red, green and blue of the bodies as far as the file gives them; the last bodies have none.
+    colours: Vec<Option<[u8; 3]>>,
     world: World,
     starts: Vec<StartRange>,
     conditions: Vec<Condition>,
@@ -104,6 +110,18 @@ impl Task {
     /// What is to be done, in words.
     pub fn instruction(&self) -> &str {
         &self.instruction
+    }
+
+    /// Corners of all bodies that may move, where these are their poses, world frame [m].
+    #[cfg(feature = "teleop")]
+    pub(crate) fn movable(&self, poses: &[RigidPose]) -> impl Iterator<Item = Point3<f64>> {
+        let moves = |(body, _): &(&BodyPlan, &RigidPose)| !matches!(body.hold, Hold::Fixed(_));
+        self.bodies.iter().zip(poses).filter(moves).flat_map(|(body, pose)| {
+            let world_from_body = camera::isometry(pose);
+            body.pieces
+                .iter()
+                .flat_map(move |piece| piece.hull.corners.iter().map(move |corner| world_from_body * piece.at * corner))
+        })
     }
 
     /// Names of the joints of the arm that carries a moved body; empty without one.

@@ -86,6 +86,7 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<Task, TomlFileError> {
         name,
         instruction,
         text,
+        colours: file.body.iter().map(|entry| entry.as_ref().colour).collect(),
         bodies,
         world,
         starts,

@@ -13,6 +13,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+/// A page's picture has at least so many columns.
+const WIDTH: u32 = 640;
 /// From one picture to the next.
 const PERIOD: Duration = Duration::from_millis(20);
 /// A jog that is not repeated counts for so long.
@@ -93,13 +95,15 @@ impl Steering {
     /// [`TeleopError`] for a task that cannot be steered or seen.
     pub(super) fn new(task: &Arc<Task>, camera: Option<&str>, mut recording: Recording) -> Result<Self, TeleopError> {
         let camera = camera_of(task, camera)?;
-        let view = task.view(camera);
         recording.seed = free(&recording, recording.seed);
         if let Some(folder) = &recording.folder {
             // Said now and not after the first episode.
             Destination::in_new_folder(&clip(folder, recording.seed), recording.force)?;
         }
         let episode = Steered::begin(task, recording.seed)?;
+        // What is steered is in the picture from the start, wherever the task's camera looks.
+        let camera = camera.finer_to(WIDTH).seeing(task.movable(&episode.poses()));
+        let view = task.view(&camera);
         let summary = Summary::default();
         let (task, size, said) = (Arc::clone(task), camera.size, "start an episode".to_owned());
         let jogged = Instant::now();
