@@ -1,7 +1,7 @@
 //! How much of a piece of work is done, and how long the rest takes, from what its stages took so far.
 //!
 //! A stage goes on at the pace at which its steps were done until now. A stage that is still to come takes as long as the last one
-//! of its name, and where there was none, its share of the plan at the pace at which the plan was worked off. The share that
+//! of its name, in proportion to what the plan gives both; where there was none, its share of the plan at the pace at which the plan was worked off. The share that
 //! is done never goes back: where there is more to do than was planned, it stands until the work has caught up, and how long the
 //! rest takes is then not known.
 
@@ -16,8 +16,8 @@ pub type Planned = (&'static str, f64);
 pub(super) struct Estimate {
     ahead: VecDeque<Planned>,
     current: Stage,
-    /// Names of the stages that are over, and how long each took [s].
-    over: Vec<(&'static str, f64)>,
+    /// The stages that are over as the plan had them, and how long each took [s].
+    over: Vec<(Planned, f64)>,
     /// What the plan gave the stages that are over, and what those of them took that were in it [s].
     worked_off: [f64; 2],
     shown: f64,
@@ -57,7 +57,7 @@ impl Estimate {
     pub(super) fn begin(&mut self, name: &'static str, steps: u64, now: Duration) {
         let now = now.as_secs_f64();
         let took = now - self.current.begun;
-        self.over.push((self.current.name, took));
+        self.over.push(((self.current.name, self.current.planned), took));
         if self.current.planned > 0.0 {
             self.worked_off = [self.worked_off[0] + self.current.planned, self.worked_off[1] + took];
         }
@@ -97,11 +97,10 @@ impl Estimate {
         }
         let current = self.left_of_current(now)?;
         let took = now - self.current.begun + current;
+        let now_and_planned = (self.current.planned, took);
         let ahead = self.ahead.iter().map(|(name, planned)| {
-            if *name == self.current.name {
-                return Some(took);
-            }
-            self.last_of(name).or_else(|| Some(planned * self.pace(took)?))
+            let same = if *name == self.current.name { Some(now_and_planned) } else { self.last_of(name) };
+            same.map(|same| in_proportion(same, *planned)).or_else(|| Some(planned * self.pace(took)?))
         });
         Some(current + ahead.sum::<Option<f64>>()?)
     }
@@ -117,7 +116,7 @@ impl Estimate {
         }
         let [worked_off, took] = self.worked_off;
         let by_plan = (worked_off > 0.0 && planned > 0.0).then(|| planned * took / worked_off);
-        let expected = self.last_of(name).or(by_plan)?;
+        let expected = self.last_of(name).map(|last| in_proportion(last, planned)).or(by_plan)?;
         Some((expected - (now - begun)).max(OVERDUE * expected))
     }
 
@@ -130,9 +129,16 @@ impl Estimate {
         (planned > 0.0).then(|| took / planned)
     }
 
-    fn last_of(&self, name: &str) -> Option<f64> {
-        self.over.iter().rev().find(|(over, _)| *over == name).map(|(_, took)| *took)
+    /// What the plan gave the last stage of a name, and what it took [s].
+    fn last_of(&self, name: &str) -> Option<(f64, f64)> {
+        self.over.iter().rev().find(|((over, _), _)| *over == name).map(|((_, planned), took)| (*planned, *took))
     }
+}
+
+/// How long a stage takes that the plan gives so much, after one of its name that was given and took so much; one that the plan did not
+/// have tells by what it took alone.
+fn in_proportion((before, took): (f64, f64), planned: f64) -> f64 {
+    if before > 0.0 && planned > 0.0 { took * planned / before } else { took }
 }
 
 #[cfg(test)]
@@ -211,6 +217,16 @@ mod tests {
         assert!((left(&mut work, 20.0) - 60.0).abs() < 1e-9);
         assert!((left(&mut work, 50.0) - 30.0).abs() < 1e-9);
         assert!((left(&mut work, 500.0) - 6.0).abs() < 1e-9, "overdue");
+    }
+
+    #[test]
+    fn a_stage_that_is_planned_half_as_long_as_one_before_is_expected_to_take_half_as_long() {
+        let mut work = Estimate::new(&[("fits", 4.0), ("conclusion", 1.0), ("fits", 2.0)], 1);
+        work.begin("conclusion", 2, seconds(40.0));
+        work.done(1, seconds(50.0));
+        assert!((left(&mut work, 50.0) - 30.0).abs() < 1e-9, "10 s of the conclusion, and 20 s of fits");
+        work.begin("fits", 5, seconds(60.0));
+        assert!((left(&mut work, 60.0) - 20.0).abs() < 1e-9);
     }
 
     #[test]

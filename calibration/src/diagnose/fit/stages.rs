@@ -21,17 +21,18 @@ pub(in crate::diagnose) const CHANGES: &str = "changes";
 /// The confirm clips are opened.
 pub(in crate::diagnose) const CONCLUSION: &str = "conclusion";
 
-/// About how long each takes beside the others.
+/// About how long each takes beside the others, from the lines that a diagnosis without a terminal writes every ten seconds (sixteen strokes
+/// or eight motions of another engine).
 const DURATIONS: [Planned; 9] = [
     (BASELINE, 1.0),
-    (SIGNATURES, 0.5),
+    (SIGNATURES, 1.0),
     (ARM_FITS, 0.5),
-    (FITS, 3.0),
-    (LAST_FITS, 1.0),
+    (FITS, 5.0),
+    (LAST_FITS, 1.5),
     (REFINEMENT, 2.5),
     (SLOPES, 1.0),
     (CHANGES, 1.5),
-    (CONCLUSION, 0.2),
+    (CONCLUSION, 2.0),
 ];
 
 /// What the bar says while a candidate is looked at.
@@ -50,9 +51,10 @@ pub(in crate::diagnose) fn further() -> Vec<Planned> {
     planned(&[SIGNATURES, FITS, LAST_FITS])
 }
 
-/// A search that finds one effect, and then looks for another beside it.
+/// A search that finds one effect; about every other one then looks for another beside it ([`further`] where it does).
 pub(in crate::diagnose) fn plan(with_object: bool) -> Vec<Planned> {
     let on_the_arm: &[&str] = if with_object { &[ARM_FITS] } else { &[] };
     let first = [&[BASELINE, SIGNATURES], on_the_arm, &[FITS, LAST_FITS, REFINEMENT]].concat();
-    planned(&[&first[..], &[SIGNATURES, FITS, LAST_FITS, CONCLUSION]].concat())
+    let perhaps = further().into_iter().map(|(stage, duration)| (stage, 0.5 * duration));
+    planned(&first).into_iter().chain(perhaps).chain(planned(&[CONCLUSION])).collect()
 }

@@ -66,6 +66,9 @@ impl<E: Evidence> Selection for Search<'_, E> {
             if first.is_some_and(|first| is_spent(near, first, &from)) {
                 return untried(near, &from, first).map(ended);
             }
+            if first.is_some() || restarts > 0 {
+                self.bar.insert(&stages::further());
+            }
             let Some(step) = tried(near, &from, (first, &worse)) else {
                 // Cut short by its budget: what was found before stands.
                 let stands = if self.bench.interrupt.spent() { untried(near, &from, first) } else { None };
@@ -74,11 +77,10 @@ impl<E: Evidence> Selection for Search<'_, E> {
             let step = reconsidered(near, step);
             let better = if before_that + restarts < MAX_RESTARTS { without_the_best(near, &step) } else { None };
             let Some(better) = better else {
-                let (step, extended) = extended(near, step, !before.is_empty())?;
+                let (step, extended) = extended(near, step)?;
                 let extended = extended.map(|fit| by_engine(self, fit, &step.weights));
                 return Some((Attempt { step, restarts }, extended));
             };
-            self.bar.insert(&stages::further());
             worse = step.worse_by_more_than_chance();
             from = by_engine(self, better, &step.weights);
         }
@@ -91,8 +93,8 @@ impl<E: Evidence> Selection for Search<'_, E> {
 }
 
 /// What a step extends with the best of its trials, both fitted to the end beside its nearest rivals; `None` as the second where none is
-/// worth it. `further`: effects were found before.
-fn extended<E: Evidence>(search: &Search<'_, E>, step: Step, further: bool) -> Option<(Step, Option<Hypothesis>)> {
+/// worth it.
+fn extended<E: Evidence>(search: &Search<'_, E>, step: Step) -> Option<(Step, Option<Hypothesis>)> {
     let best = |step: &Step| step.best(search.bench).map(|(_, fit, _)| fit.clone());
     let Some(fit) = best(&step).filter(|_| step.from.effects.len() < EFFECTS.max_extensions) else {
         return Some((step, None));
@@ -102,9 +104,6 @@ fn extended<E: Evidence>(search: &Search<'_, E>, step: Step, further: bool) -> O
         return Some((step, Some(fit)));
     }
     search.bar.stage(stages::REFINEMENT, 2);
-    if further {
-        search.bar.insert(&stages::further());
-    }
     let to_the_end = refitted(search, &fit, &step.weights)?;
     search.bar.show(1, stages::REFINEMENT);
     let step = rivals_refitted(search, step, &to_the_end);
