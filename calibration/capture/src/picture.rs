@@ -9,6 +9,9 @@ const PIXELS_PER_METRE: f64 = 1400.0;
 /// Half the width of what is shown [m].
 const HALF_WIDTH: f64 = 0.24;
 
+/// Length of the scale bar [m].
+const SCALE: f64 = 0.1;
+
 /// The picture as an SVG file: x of the base frame upwards, y to the left, as seen from behind the robot.
 pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> String {
     let stroke = &next.stroke;
@@ -60,6 +63,17 @@ pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> St
         after[0], after[1], stop[0], stop[1]
     ));
     draw(format_args!("<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"7\" fill=\"#b4552d\"/>", before[0], before[1]));
+    // A scale, the base's axes, and the way to its origin.
+    let (bar, foot) = (PIXELS_PER_METRE * SCALE, width - 14.0);
+    let corner = [width - 30.0, foot - 40.0];
+    let line = |[x1, y1]: [f64; 2], [x2, y2]: [f64; 2]| {
+        format!(
+            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"#222\" stroke-width=\"2\"/>"
+        )
+    };
+    draw(format_args!("{}", line([12.0, foot], [12.0 + bar, foot])));
+    draw(format_args!("{}", line(corner, [corner[0], corner[1] - 40.0])));
+    draw(format_args!("{}", line(corner, [corner[0] - 40.0, corner[1]])));
     let mut note = |[x, y]: [f64; 2], text: &str| {
         svg.write_fmt(format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"#222\">{text}</text>"))
             .expect("a string takes all text");
@@ -67,7 +81,13 @@ pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> St
     note([before[0] - 70.0, before[1] + 26.0], "the tool comes down here");
     note([rest[0] - 70.0, rest[1] - PIXELS_PER_METRE * 0.5 * size[0].hypot(size[1]) - 8.0], "comes to rest about here");
     note([12.0, 22.0], "from above; the robot's base is below, its left is on the left");
-    note([12.0, width + 8.0], &format!("object at x {x0:.3} m, y {y0:.3} m"));
+    note([12.0, foot - 6.0], &format!("{:.0} mm", 1e3 * SCALE));
+    note([corner[0] + 5.0, corner[1] - 32.0], "x");
+    note([corner[0] - 40.0, corner[1] + 16.0], "y");
+    note(
+        [12.0, width + 8.0],
+        &format!("object at x {x0:.3} m, y {y0:.3} m, {:.2} m from the robot's base", x0.hypot(y0)),
+    );
     let words = format!(
         "towards {:.0}\u{b0} at {:.2} m/s, {:.0} mm beside the centre, {:.0} mm high",
         stroke.heading.to_degrees(),
