@@ -20,7 +20,7 @@ Examples:
 JSON: session, clips [file]; with --reveal: effects [{name, parameters}].")]
 pub struct ExampleArguments {
     /// Folder to create.
-    #[arg(value_name = "SESSION")]
+    #[arg(value_name = "FOLDER")]
     out: PathBuf,
     /// Strokes at an object instead of the arm alone.
     #[arg(long)]

@@ -170,9 +170,19 @@ pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
 fn in_words(found: &Viewpoint) -> String {
     let [x, y, z] = found.camera.position;
     let [qw, qx, qy, qz] = found.camera.orientation;
-    let mut lines = vec![format!(
+    let mut lines = Vec::new();
+    if let Some(start) = &found.start {
+        lines.push(format!(
+            "The camera is {:.1} mm and {:.2} degrees from where the search began, {:.1} pixels in the picture: {} than its interval",
+            start.distance_m * 1e3,
+            start.angle_rad.to_degrees(),
+            start.reprojection_px,
+            if start.excluded { "more" } else { "no more" }
+        ));
+    }
+    lines.push(format!(
         "camera in the base frame: {x:.4}, {y:.4}, {z:.4} m; {qw:.5}, {qx:.5}, {qy:.5}, {qz:.5} (w, x, y, z)"
-    )];
+    ));
     if let Some(interval) = &found.interval {
         let [a, b, c] = interval.position.map(|v| v * 1e3);
         let [d, e, f] = interval.rotation.map(f64::to_degrees);
@@ -184,15 +194,6 @@ fn in_words(found: &Viewpoint) -> String {
         "{confirmed:.0} % of the outline confirmed in {pictures} {kind} pictures; {} drawings, {:.1} s",
         found.drawings, found.seconds
     ));
-    if let Some(start) = &found.start {
-        lines.push(format!(
-            "the start was {:.1} mm and {:.2} degrees away, {:.1} pixels in the picture{}",
-            start.distance_m * 1e3,
-            start.angle_rad.to_degrees(),
-            start.reprojection_px,
-            if start.excluded { ": outside of the interval" } else { "" }
-        ));
-    }
     lines.extend(found.warnings.iter().map(|warning| format!("note: {warning}")));
     lines.join("\n")
 }
