@@ -62,5 +62,5 @@ fn wrong_arguments_end_with_two() {
 #[test]
 fn the_help_shows_an_example() {
     let help = text(&shadow("help", &["--help"]).stdout);
-    assert!(help.contains("twin shadow --cell config/fr3_cell.toml"), "{help}");
+    assert!(help.contains("twin shadow --cell fr3"), "{help}");
 }
