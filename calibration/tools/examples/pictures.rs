@@ -2,7 +2,7 @@
 //! its cell.toml does not know is made and diagnosed; the figures of its page, and robot and twin at the moment at which they are
 //! furthest apart, are written as pictures of their own.
 
-use anyhow::{Context as _, ensure};
+use anyhow::Context as _;
 use calibration::demo::example::Order;
 use calibration::diagnose::{Options, diagnose};
 use calibration::report::diagnosis::page;
@@ -13,8 +13,8 @@ use std::path::PathBuf;
 use twin::replay::Replayer;
 use twin::show::{Film, Stage};
 
-/// In this session a payload is hidden.
-const SEED: u64 = 3;
+/// Seeds among which one is looked for that hides a payload.
+const SEEDS: std::ops::Range<u64> = 1..100;
 /// By so much the difference of robot and twin is drawn larger.
 const TIMES: f64 = 100.0;
 /// Width and height of that picture [pixel].
@@ -24,8 +24,9 @@ fn main() -> anyhow::Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "docs/pictures".into()));
     std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let made = tempfile::tempdir()?;
-    let order = Order { out: made.path().join("session"), force: false, strokes: false, seed: SEED };
-    ensure!(order.hidden()?.iter().any(|effect| effect.name == "payload"), "another seed hides the payload");
+    let mut orders = SEEDS.map(|seed| Order { out: made.path().join("session"), force: false, strokes: false, seed });
+    let hides = |order: &Order| order.hidden().is_ok_and(|hidden| hidden.iter().any(|effect| effect.name == "payload"));
+    let order = orders.find(hides).context("none of these seeds hides a payload")?;
     order.write()?;
     let session = Session::open(&order.out)?;
     let html = page(&diagnose(&session, &Options::default(), &Interrupt::default())?);

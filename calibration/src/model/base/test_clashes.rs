@@ -142,7 +142,7 @@ fn urdf_merged(own: &str, joints: &[String]) -> Result<super::super::ModelFile, 
 
 #[test]
 fn loads_hang_at_the_cells_flange_before_the_end_of_the_root_and_once() {
-    let bare = write(&shipped(), &Theta::default(), Format::Urdf).expect("a model").text;
+    let bare = write(&shipped(), &Theta::default(), Format::Urdf, None).expect("a model").text;
     let hand = "<link name='hand'/><joint name='hand' type='fixed'><parent link='fr3_link7'/><child link='hand'/><origin xyz='0 0 0.3'/></joint>";
     let (before, rest) = bare.split_once("<joint ").expect("joints");
     let own = format!("{before}{hand}<joint {rest}<!-- </robot> -->\n").replace("UTF-8", "ISO-8859-1");

@@ -121,7 +121,7 @@ fn places_come_into_the_frame_of_the_base_wherever_it_stands() {
         ),
         ("pos='0 0 1' euler='0 90 0'", Isometry3::new(Vector3::new(0.0, 0.0, 1.0), Vector3::y() * 90_f64.to_radians())),
     ];
-    let cell = super::super::write(&shipped(), &Theta::default(), Format::Mjcf).expect("a model");
+    let cell = super::super::write(&shipped(), &Theta::default(), Format::Mjcf, None).expect("a model");
     let cell = Element::read(&cell.text).expect("XML");
     for (text, base) in bases {
         let (model, root) = merged(&lab(text, "", ""), payload, &[]).expect("a model");
@@ -212,7 +212,7 @@ fn included_files_come_in_and_meshes_are_found_from_the_new_file() {
 #[test]
 fn a_urdf_keeps_everything_but_what_is_known() {
     let folder = tempfile::tempdir().expect("a folder");
-    let bare = super::super::write(&shipped(), &Theta::default(), Format::Urdf).expect("a model").text;
+    let bare = super::super::write(&shipped(), &Theta::default(), Format::Urdf, None).expect("a model").text;
     let own = bare.replace("fr3_joint", "joint").replace("effort=\"87\"", "effort=\"20\"");
     let file = folder.path().join("own.urdf");
     std::fs::write(&file, &own).expect("room");
