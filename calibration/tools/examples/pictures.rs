@@ -15,8 +15,14 @@ use twin::show::{Film, Stage};
 
 /// Seeds among which one is looked for that hides a payload.
 const SEEDS: std::ops::Range<u64> = 1..100;
+/// What figures of a page show, as they say themselves, and how their files are called.
+const FIGURES: [(&str, &str); 3] = [
+    ("bars before and after", "gap"),
+    ("shares of the gap by stage, channel and regime", "where"),
+    ("parameters with intervals", "parameters"),
+];
 /// By so much the difference of robot and twin is drawn larger.
-const TIMES: f64 = 100.0;
+const TIMES: f64 = 30.0;
 /// Width and height of that picture [pixel].
 const SIZE: [usize; 2] = [560, 420];
 
@@ -31,8 +37,10 @@ fn main() -> anyhow::Result<()> {
     let session = Session::open(&order.out)?;
     let html = page(&diagnose(&session, &Options::default(), &Interrupt::default())?);
     let style = style(&html).context("a page without a style")?;
-    for (number, figure) in figures(&html).enumerate() {
-        let file = folder.join(format!("diagnosis_{number}.svg"));
+    for (shows, name) in FIGURES {
+        let label = format!("aria-label=\"{shows}\"");
+        let figure = figures(&html).find(|figure| figure.contains(&label)).with_context(|| format!("no {shows}"))?;
+        let file = folder.join(format!("{name}.svg"));
         output::write(&file, alone(figure, &style))?;
         eprintln!("{}", file.display());
     }
