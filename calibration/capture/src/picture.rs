@@ -63,17 +63,7 @@ pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> St
         after[0], after[1], stop[0], stop[1]
     ));
     draw(format_args!("<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"7\" fill=\"#b4552d\"/>", before[0], before[1]));
-    // A scale, the base's axes, and the way to its origin.
-    let (bar, foot) = (PIXELS_PER_METRE * SCALE, width - 14.0);
-    let corner = [width - 30.0, foot - 40.0];
-    let line = |[x1, y1]: [f64; 2], [x2, y2]: [f64; 2]| {
-        format!(
-            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"#222\" stroke-width=\"2\"/>"
-        )
-    };
-    draw(format_args!("{}", line([12.0, foot], [12.0 + bar, foot])));
-    draw(format_args!("{}", line(corner, [corner[0], corner[1] - 40.0])));
-    draw(format_args!("{}", line(corner, [corner[0] - 40.0, corner[1]])));
+    svg.push_str(&scale(width));
     let mut note = |[x, y]: [f64; 2], text: &str| {
         svg.write_fmt(format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"#222\">{text}</text>"))
             .expect("a string takes all text");
@@ -81,9 +71,6 @@ pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> St
     note([before[0] - 70.0, before[1] + 26.0], "the tool comes down here");
     note([rest[0] - 70.0, rest[1] - PIXELS_PER_METRE * 0.5 * size[0].hypot(size[1]) - 8.0], "comes to rest about here");
     note([12.0, 22.0], "from above; the robot's base is below, its left is on the left");
-    note([12.0, foot - 6.0], &format!("{:.0} mm", 1e3 * SCALE));
-    note([corner[0] + 5.0, corner[1] - 32.0], "x");
-    note([corner[0] - 40.0, corner[1] + 16.0], "y");
     note(
         [12.0, width + 8.0],
         &format!("object at x {x0:.3} m, y {y0:.3} m, {:.2} m from the robot's base", x0.hypot(y0)),
@@ -98,4 +85,25 @@ pub(super) fn picture(next: &Next, size: [f64; 3], obstacles: &[Obstacle]) -> St
     note([12.0, width + 28.0], &words);
     svg.push_str("</svg>\n");
     svg
+}
+
+/// The scale, and the base's axes, in the lower corners of a picture so wide.
+fn scale(width: f64) -> String {
+    let foot = width - 14.0;
+    let [x, y] = [width - 30.0, foot - 40.0];
+    let line = |[x1, y1]: [f64; 2], [x2, y2]: [f64; 2]| {
+        format!(
+            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"#222\" stroke-width=\"2\"/>"
+        )
+    };
+    let note = |[x, y]: [f64; 2], text: &str| format!("<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"#222\">{text}</text>");
+    [
+        line([12.0, foot], [12.0 + PIXELS_PER_METRE * SCALE, foot]),
+        note([12.0, foot - 6.0], &format!("{:.0} mm", 1e3 * SCALE)),
+        line([x, y], [x, y - 40.0]),
+        note([x + 5.0, y - 32.0], "x"),
+        line([x, y], [x - 40.0, y]),
+        note([x - 40.0, y + 16.0], "y"),
+    ]
+    .concat()
 }

@@ -183,18 +183,9 @@ impl ArmModel {
                 };
                 let answer = stage.answer(&mut modes);
                 let modes = modes.expect("an answer leaves its pattern");
-                for (i, (dry, gear)) in modes.into_iter().enumerate() {
-                    let side = &stage.sides[i];
-                    let sticks = dry == Dry::Sticks && side.yields == Yields::Nowhere;
-                    bent[i] = side.yields.bent((side.motor_speed, side.motor_speed + part * answer.motor[i]), part);
-                    advance(link, i, answer.link[i], sticks && gear == Gear::Rigid, part);
-                    match gear {
-                        Gear::Rigid => (motor.q[i], motor.dq[i]) = (link.q[i], link.dq[i]),
-                        _ => advance(motor, i, answer.motor[i], sticks, part),
-                    }
-                    whole.tau_J[i] += answer.gear[i] / parts as f64;
-                    whole.grip[i] = side.grip(modes[i], answer.motor[i], part);
-                }
+                let passed = stage.carry_out((&answer, modes), (&mut *link, &mut *motor, &mut *bent));
+                whole.grip = passed.grip;
+                whole.tau_J.iter_mut().zip(passed.tau_J).for_each(|(mean, torque)| *mean += torque / parts as f64);
             }
             whole
         })
@@ -250,6 +241,28 @@ fn advance(state: &mut JointState, i: usize, acceleration: f64, stops: bool, dt:
 }
 
 impl<const N: usize> Stage<N> {
+    /// Moves links, motors and bristles on by what was answered; what came through the joints meanwhile.
+    fn carry_out(
+        &self,
+        (answer, modes): (&Answer<N>, [(Dry, Gear); N]),
+        (link, motor, bent): (&mut JointState, &mut JointState, &mut Joints),
+    ) -> Passed {
+        let mut passed = Passed::default();
+        for (i, (dry, gear)) in modes.into_iter().enumerate() {
+            let side = &self.sides[i];
+            let sticks = dry == Dry::Sticks && side.yields == Yields::Nowhere;
+            bent[i] = side.yields.bent((side.motor_speed, side.motor_speed + self.dt * answer.motor[i]), self.dt);
+            advance(link, i, answer.link[i], sticks && gear == Gear::Rigid, self.dt);
+            match gear {
+                Gear::Rigid => (motor.q[i], motor.dq[i]) = (link.q[i], link.dq[i]),
+                _ => advance(motor, i, answer.motor[i], sticks, self.dt),
+            }
+            passed.tau_J[i] = answer.gear[i];
+            passed.grip[i] = side.grip(modes[i], answer.motor[i], self.dt);
+        }
+        passed
+    }
+
     /// Solves for the pattern and for the speeds of joints that yield.
     fn answer(&mut self, modes: &mut Option<[(Dry, Gear); N]>) -> Answer<N> {
         let mut answer = self.pattern(modes);
