@@ -6,7 +6,7 @@
 //! thousandth, and no engine yields to a contact as another does, so the little by which the contact force is off would bend
 //! them. Their slopes by what the arm feels count as zero (a cut, as in modular inference: Liu, Bayarri and Berger 2009).
 //!
-//! Nor do they say anything about a [vertical force](super::vertical).
+//! Nor do they say anything about a vertical force (`vertical.rs`).
 
 use super::arm::ArmClips;
 use super::object::{self, ObjectClips};
