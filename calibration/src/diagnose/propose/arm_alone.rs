@@ -27,16 +27,16 @@ impl<E: Evidence> ArmAlone<'_, E> {
 
 /// Trials of effects in the joints, at their `places` in a step, fitted to the arm's own channels first; those that explain these about
 /// as well as the best of them are looked at once with the object as well. What an object does after it was hit a little
-/// elsewhere is no judge of joints. `others`: trials that the caller fits next, for the bar.
+/// elsewhere is no judge of joints. `others`: steps of the bar that the caller takes next.
 pub(in crate::diagnose) fn fitted<E: Evidence>(
     search: &Search<'_, E>,
     step: &Step,
     places: &[usize],
     overlooked: bool,
-    others: usize,
+    others: u64,
 ) -> Vec<(usize, Hypothesis)> {
     if places.is_empty() {
-        search.bar.stage(stages::FITS, others as u64);
+        search.bar.stage(stages::FITS, others);
         return Vec::new();
     }
     let (bench, evidence) = (search.bench, ArmAlone(search.bench.evidence));
@@ -63,7 +63,7 @@ pub(in crate::diagnose) fn fitted<E: Evidence>(
     let anew = if arm_gap_is_open(&step.whole, &step.left) { (search.refined)(&best.full) } else { None };
     let near: Vec<(usize, Hypothesis<WithoutOwn>)> =
         all.into_iter().filter(|(_, alone)| alone.deviance() < near).collect();
-    search.bar.stage(stages::FITS, (near.len() + others) as u64);
+    search.bar.stage(stages::FITS, near.len() as u64 + others);
     let looked_at = |(done, (place, alone)): (usize, (usize, Hypothesis<WithoutOwn>))| {
         search.bar.show(done as u64, &label(stages::FITS, place));
         let candidate = step.trials[place].scored.candidate;

@@ -202,15 +202,21 @@ fn fitted<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: &[usize], ove
         trial.own_numbers && bench.library.is_of_arm(trial.scored.candidate)
     };
     let (of_arm, others): (Vec<usize>, Vec<usize>) = asked.partition(on_arm);
-    let mut fits = arm_alone::fitted(search, &step, &of_arm, overlooked, others.len());
-    let before = fits.len();
-    for (done, place) in others.into_iter().enumerate() {
+    // For the bar: one that is looked at and fitted to the end from many places counts as so many.
+    let steps = |place: &usize| {
+        let candidate = &bench.library.candidates[step.trials[*place].scored.candidate];
+        if starts::has_many_minima(candidate) { 2 * MAX_FORMS as u64 } else { 1 }
+    };
+    let mut fits = arm_alone::fitted(search, &step, &of_arm, overlooked, others.iter().map(steps).sum());
+    let mut done = fits.len() as u64;
+    for place in others {
         if bench.interrupt.asked() {
             return step;
         }
         let candidate = step.trials[place].scored.candidate;
         let label = stages::of(stages::FITS, bench.library.name(candidate));
-        search.bar.show((before + done) as u64, &label);
+        search.bar.show(done, &label);
+        done += steps(&place);
         fits.extend(a_little(search, &step, place, overlooked).map(|fit| (place, fit)));
     }
     let best = fits.iter().map(|(_, fit)| fit.deviance()).fold(step.from.deviance(), f64::min);
