@@ -58,7 +58,7 @@ pub struct ExportModelArguments {
     /// Where the model goes [default: standard output].
     #[arg(long, value_name = "MODEL")]
     out: Option<PathBuf>,
-    /// Replaces the file of --out.
+    /// Replaces the file of --out and the meshes of --meshes.
     #[arg(long, requires = "out")]
     force: bool,
     /// Prints one JSON object on stdout at the end.
@@ -122,8 +122,9 @@ pub(super) fn run(arguments: &ExportModelArguments) -> anyhow::Result<()> {
         None => {
             let of = |folder: &PathBuf| Look::of(&cell, folder, out.as_deref().unwrap_or(Path::new("")));
             let look = meshes.as_ref().map(of).transpose()?;
-            look.as_ref().map_or(Ok(()), Look::write)?;
-            model::write(&cell, &theta, format, look)?
+            let file = model::write(&cell, &theta, format, look.clone())?;
+            look.map_or(Ok(()), |look| look.write(*force))?;
+            file
         }
     };
     let Some(place) = place else {

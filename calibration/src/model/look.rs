@@ -3,7 +3,7 @@
 use anyhow::Context as _;
 use nalgebra::Isometry3;
 use shared_mem::cell::Cell;
-use shared_mem::output;
+use shared_mem::output::Destination;
 use std::path::{Path, PathBuf};
 use twin::arm::MAX_JOINTS;
 use twin::render::{Hand, Mesh, RobotSurface};
@@ -79,14 +79,16 @@ impl Look {
         self.parts.iter().filter(move |part| part.link == link)
     }
 
-    /// Writes the meshes.
+    /// Writes the meshes; those that are there already only with `force`.
     ///
     /// # Errors
-    /// A folder or file that cannot be written.
-    pub fn write(&self) -> anyhow::Result<()> {
-        std::fs::create_dir_all(&self.folder).with_context(|| format!("cannot make {}", self.folder.display()))?;
-        for part in &self.parts {
-            output::write(&self.folder.join(format!("{}.stl", part.name)), stl(&part.mesh))?;
+    /// A folder or file that cannot be written, or a file that would be lost: nothing is written then.
+    pub fn write(&self, force: bool) -> anyhow::Result<()> {
+        let place =
+            |part: &VisiblePart| Destination::in_new_folder(&self.folder.join(format!("{}.stl", part.name)), force);
+        let places = self.parts.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        for (place, part) in places.iter().zip(&self.parts) {
+            place.write(stl(&part.mesh))?;
         }
         Ok(())
     }
@@ -138,7 +140,9 @@ mod tests {
         let cell = Cell::read(Path::new("fr3")).expect("the cell that is built in");
         let (meshes, out) = (folder.path().join("meshes"), folder.path().join("cell.xml"));
         let look = Look::of(&cell, &meshes, &out).expect("a shape");
-        look.write().expect("room");
+        look.write(false).expect("room");
+        assert!(look.write(false).is_err(), "what is there stays");
+        look.write(true).expect("room");
         for (format, key) in [(Format::Mjcf, "file=\""), (Format::Urdf, "filename=\"")] {
             let text = write(&cell, &Theta::default(), format, Some(look.clone())).expect("a model").text;
             let files: Vec<&str> = text.split(key).skip(1).filter_map(|rest| rest.split('"').next()).collect();

@@ -14,10 +14,11 @@ fn intervals_reach_as_far_as_rough_hits_leave_a_number_open() {
     let cell = Cell::parse(text, Path::new("fr3_cell.toml")).expect("the shipped file");
     let world = World::draw(24, Kind::Strokes, Fault::Nothing, &cell);
     let session = Subject::Object.examine(&world, 8, &Interrupt::default());
-    for name in ["friction", "centre_of_mass[2]"] {
-        let printed = session.printed.iter().find(|printed| printed.name == name).expect("a number with an interval");
-        let [low, high] = printed.interval;
-        // One interval in twenty may miss the truth, and none by as much as these did.
-        assert!((printed.truth - printed.value).abs() <= 1.5 * 0.5 * (high - low), "{printed:?}");
-    }
+    let found =
+        |name: &str| session.printed.iter().find(|printed| printed.name == name).expect("a number with an interval");
+    assert!(found("friction").holds(), "{:?}", found("friction"));
+    let height = found("centre_of_mass[2]");
+    let [low, high] = height.interval;
+    // It is told less since what a vertical force does to the joints is left out, and one interval in twenty may miss.
+    assert!((height.truth - height.value).abs() <= 1.5 * 0.5 * (high - low), "{height:?}");
 }
