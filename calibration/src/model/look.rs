@@ -44,9 +44,12 @@ impl Look {
     /// # Errors
     /// An arm of which only the joints' names are known, or none.
     pub fn of(cell: &Cell, folder: &Path, beside: &Path) -> anyhow::Result<Self> {
-        let surface =
-            RobotSurface::new(cell, Hand::None).context("an arm without a shape has no meshes; leave --meshes out")?;
+        let surface = RobotSurface::new(cell, Hand::None).context("cell.toml describes no arm to be seen")?;
         let model = surface.model();
+        anyhow::ensure!(
+            model.has_geometry(),
+            "of this arm only the joints' names are known, and nothing to be seen; leave --meshes out"
+        );
         let (zero, dof) = ([0.0; MAX_JOINTS], model.dof());
         let (frames, flange) = (model.link_frames(&zero), model.flange(&zero).isometry());
         let links = surface.links();
