@@ -14,6 +14,8 @@ use shared_mem::cell::Cell;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use tokio::sync::Semaphore;
+use tokio::task::spawn_blocking;
 
 /// The page. Nothing else is fetched.
 const PAGE: &str = include_str!("page.html");
@@ -37,6 +39,8 @@ struct Shown {
     stage: Stage,
     /// The films' numbers, as JSON.
     numbers: String,
+    /// One picture is drawn at a time, however many are asked for: a large one takes some ten megabytes and milliseconds.
+    drawing: Arc<Semaphore>,
 }
 
 /// What a page is told first.
@@ -64,7 +68,7 @@ pub fn serve(
     let drawn = films.iter().any(|film| stage.shows(film));
     let told = Told { title, drawn, films: films.iter().map(Film::numbers).collect() };
     let numbers = serde_json::to_string(&told).expect("numbers have a JSON form");
-    let shown = Arc::new(Shown { films, stage, numbers });
+    let shown = Arc::new(Shown { films, stage, numbers, drawing: Arc::new(Semaphore::new(1)) });
     let routes = Router::new()
         .route("/", get(|| async { Html(PAGE) }))
         .route("/films.json", get(numbers_of))
@@ -84,10 +88,19 @@ async fn picture(State(shown): State<Arc<Shown>>, RawQuery(query): RawQuery) -> 
     let place = |name: &str| number(name).filter(|value| (0.0..1e9).contains(value)).map(|value| value as usize);
     let width = number("width").filter(|width| width.is_finite()).unwrap_or(640.0).clamp(WIDTHS[0], WIDTHS[1]);
     let times = number("times").filter(|times| times.is_finite()).unwrap_or(1.0).clamp(0.0, MOST_TIMES);
-    let film = place("film").and_then(|film| shown.films.get(film)).filter(|film| shown.stage.shows(film));
     let size = [width as usize, (0.75 * width) as usize];
-    let png = film.zip(place("at")).and_then(|(film, at)| shown.stage.picture(film, at, times, size));
-    match png {
+    let moment = place("film").zip(place("at"));
+    let Ok(turn) = Arc::clone(&shown.drawing).acquire_owned().await else {
+        return StatusCode::SERVICE_UNAVAILABLE.into_response();
+    };
+    // Beside the thread that answers, which stays free for other pages and for the end; who goes away keeps the turn until it is drawn.
+    let drawn = spawn_blocking(move || {
+        let _turn = turn;
+        let (film, at) = moment?;
+        let film = shown.films.get(film).filter(|film| shown.stage.shows(film))?;
+        shown.stage.picture(film, at, times, size)
+    });
+    match drawn.await.ok().flatten() {
         Some(png) => ([(header::CONTENT_TYPE, "image/png")], png).into_response(),
         None => (StatusCode::NOT_FOUND, "no such moment: /films.json lists them").into_response(),
     }
