@@ -88,7 +88,8 @@ impl Program {
         }
     }
 
-    /// The binary, or else the one that holds the verbs of all programs: beside this one, else on the PATH. Of a test, which cargo builds into `deps`, beside that folder too.
+    /// The binary, or else the one that holds the verbs of all programs: beside this one, else on the PATH. Of a test, which cargo
+    /// builds into `deps`, beside that folder too.
     ///
     /// # Errors
     /// [`ProcessError::Missing`], which says how to build it.

@@ -33,7 +33,7 @@ pub enum RecordError {
 /// What is recorded.
 #[derive(Debug, Clone, Copy)]
 pub struct Recording<'a> {
-    /// Rides along.
+    /// The cell.toml that is copied into the clip.
     pub cell: &'a Path,
     /// Shared-memory domain; default: the one this process was started in.
     pub domain: Option<&'a str>,

@@ -72,9 +72,9 @@ pub struct Identification {
 }
 
 impl Identification {
-    /// Whether gains were searched in vain: the search did not converge, no number is identifiable, and at least half of the gap is
+    /// Whether gains alone do not explain the clips: the search did not converge, no number is identifiable, and at least half of the gap is
     /// left in the clips that were fitted. Something else acts in them.
-    pub fn is_lost(&self) -> bool {
+    pub fn is_unexplained(&self) -> bool {
         let Gap { train_before, train, .. } = &self.gap;
         let halved = |before: Option<f64>, after: Option<f64>| before.zip(after).is_some_and(|(b, a)| a < 0.5 * b);
         self.target == "arm"

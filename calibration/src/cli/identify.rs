@@ -239,6 +239,6 @@ impl Task {
             page.write(identification::page(&found))?;
         }
         print(json, &found, terminal::identification(&found))?;
-        if found.is_lost() { Err(NoAnswer.into()) } else { Ok(()) }
+        if found.is_unexplained() { Err(NoAnswer.into()) } else { Ok(()) }
     }
 }

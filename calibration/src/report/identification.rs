@@ -54,7 +54,7 @@ pub(super) fn sentence(found: &Identification) -> String {
     } else {
         ("held-out clips", &found.gap.holdout_before, &found.gap.holdout)
     };
-    if found.is_lost() {
+    if found.is_unexplained() {
         let next = found.files.command("calibration diagnose");
         return format!("Gains alone do not explain these clips: something else acts, and `{next}` says what");
     }

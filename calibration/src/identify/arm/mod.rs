@@ -39,8 +39,8 @@ use twin::arm::ArmModel;
 use twin::effects::{EffectInfo, Robot, Stage, find, registry};
 
 /// Said where a search ended with its budget or was stopped.
-const UNFINISHED: &str = "not converged: values and intervals are those of the place where the search stopped; give it more budget, or \
-                          search for what else acts";
+const UNFINISHED: &str = "not converged: values and intervals are those of the place where the search stopped; let pso and cma \
+                          try more --points, or search for what else acts";
 
 /// What a clip's prediction takes from a vector of numbers.
 type Numbers<'a> = Box<dyn Fn(&[f64]) -> Theta + Sync + 'a>;
@@ -116,9 +116,9 @@ fn identify_kept(
     answer.warnings.extend(clips.warnings("another motion"));
     Used::add_remarks(&mut answer);
     answer.clips = clips.clips;
-    // Of an object nothing was found, and by a search that was lost nothing at all.
+    // Of an object nothing was found, and where gains alone do not explain the clips, nothing at all.
     let given = given.unwrap_or_default();
-    if answer.is_lost() {
+    if answer.is_unexplained() {
         return Ok((answer, given));
     }
     let theta = Theta { object: given.object, others: given.others, ..settings.theta(&finding.fit.shared) };
