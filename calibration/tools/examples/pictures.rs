@@ -46,7 +46,8 @@ fn main() -> anyhow::Result<()> {
     }
     let (clip, prediction, _) = Replayer::new(&session.cell, None)?.replay(session.read(&session.clips[0])?)?;
     let film = Film::of("clip_00.mcap", &clip, &prediction).context("a clip of the arm")?;
-    let twin = Stage::of(&session.cell)?.picture(&film, film.widest(), TIMES, SIZE).context("the arm's shape")?;
+    let (stage, widest) = (Stage::of(&session.cell)?, film.widest());
+    let twin = stage.picture(&stage.film(film), widest, TIMES, SIZE).context("the arm's shape")?;
     let file = folder.join("twin.png");
     output::write(&file, twin)?;
     eprintln!("{}", file.display());

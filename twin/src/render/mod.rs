@@ -22,7 +22,7 @@ pub(crate) use misplaced::misplaced;
 pub use painter::{Drawer, Model, PaintError, Painter};
 pub use portrait::portrait;
 #[cfg(feature = "teleop")]
-pub(crate) use portrait::{Look, points_of};
+pub(crate) use portrait::{Framing, Look, points_of};
 pub use robot::{Hand, RobotSurface};
 pub(crate) use shown::{ScannedLink, Shown};
 pub use splat::{Mesh, Pinhole, Raster};

@@ -22,7 +22,7 @@ pub fn portrait(
     background: [u8; 3],
     colour: impl Fn(usize) -> Option<[u8; 3]>,
 ) -> Vec<u8> {
-    let look = Look::at(&points_of(surface, q), size);
+    let look = Framing::of(&points_of(surface, q)).look(size);
     let mut raster = look.raster(background);
     look.draw_robot(&mut raster, surface, q, colour);
     look.pixels(&raster)
@@ -37,6 +37,34 @@ pub(crate) fn points_of(surface: &RobotSurface, q: &Joints) -> Vec<Point3<f64>> 
     points
 }
 
+/// From where things are looked at, and how far they reach there: whatever the size of the picture.
+#[derive(Clone, Copy)]
+pub(crate) struct Framing {
+    camera_from_base: Isometry3<f64>,
+    /// Of all points on the plane at 1 m from the eye: least and largest to the right and downwards.
+    spans: [[f64; 2]; 2],
+}
+
+impl Framing {
+    /// One in which all these points are seen.
+    pub(crate) fn of(points: &[Point3<f64>]) -> Self {
+        let camera_from_base = eye(points).inverse();
+        let mut spans = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for seen in points.iter().map(|point| camera_from_base * point) {
+            for ([low, high], x) in spans.iter_mut().zip([seen.x / seen.z, seen.y / seen.z]) {
+                (*low, *high) = (low.min(x), high.max(x));
+            }
+        }
+        Self { camera_from_base, spans }
+    }
+
+    /// The lens through which they fill a picture of `width` x `height` pixels.
+    pub(crate) fn look(&self, size: [usize; 2]) -> Look {
+        let pinhole = filling(self.spans, size.map(|n| n * FINER));
+        Look { camera_from_base: self.camera_from_base, pinhole, size }
+    }
+}
+
 /// From where, and through which lens, things fill a picture.
 pub(crate) struct Look {
     camera_from_base: Isometry3<f64>,
@@ -45,14 +73,6 @@ pub(crate) struct Look {
 }
 
 impl Look {
-    /// One in which all these points are seen, in a picture of `width` x `height` pixels.
-    pub(crate) fn at(points: &[Point3<f64>], size: [usize; 2]) -> Self {
-        let camera_from_base = eye(points).inverse();
-        let seen = points.iter().map(|point| camera_from_base * point);
-        let pinhole = filling(&seen.map(|p| [p.x / p.z, p.y / p.z]).collect::<Vec<_>>(), size.map(|n| n * FINER));
-        Self { camera_from_base, pinhole, size }
-    }
-
     /// An empty picture.
     pub(crate) fn raster(&self, background: [u8; 3]) -> Raster {
         let [wide, high] = self.size.map(|pixels| pixels * FINER);
@@ -103,13 +123,8 @@ fn eye(points: &[Point3<f64>]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(middle - AWAY * radius * forward), turn)
 }
 
-/// The pinhole through which points on the plane at 1 m fill a picture.
-fn filling(points: &[[f64; 2]], size: [usize; 2]) -> Pinhole {
-    let span = |axis: usize| {
-        let of_axis = points.iter().map(|point| point[axis]);
-        of_axis.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-    };
-    let ([left, right], [top, bottom]) = (span(0), span(1));
+/// The pinhole through which what reaches so far on the plane at 1 m fills a picture.
+fn filling([[left, right], [top, bottom]]: [[f64; 2]; 2], size: [usize; 2]) -> Pinhole {
     let room = |pixels: usize| (pixels as f64 - 2.0 * MARGIN * FINER as f64).max(1.0);
     let focal = (room(size[0]) / (right - left)).min(room(size[1]) / (bottom - top));
     let middle = |pixels: usize, mean: f64| (0.5 * (pixels as f64 - 1.0) - focal * mean) as f32;

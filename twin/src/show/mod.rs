@@ -13,4 +13,4 @@ mod stage;
 
 pub use film::Film;
 pub use server::{ShowError, serve};
-pub use stage::Stage;
+pub use stage::{Stage, Staged};

@@ -1,9 +1,9 @@
 //! The page, the numbers of its films, and a picture of each moment that it asks for.
 
 use super::film::{Film, Numbers};
-use super::stage::Stage;
+use super::stage::{Stage, Staged};
 use crate::arm::ModelError;
-use crate::web::{Address, Site, WebError};
+use crate::web::{Address, OneAtATime, Site, WebError};
 use axum::Router;
 use axum::extract::{RawQuery, State};
 use axum::http::{StatusCode, header};
@@ -14,8 +14,6 @@ use shared_mem::cell::Cell;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use tokio::sync::Semaphore;
-use tokio::task::spawn_blocking;
 
 /// The page. Nothing else is fetched.
 const PAGE: &str = include_str!("page.html");
@@ -35,12 +33,12 @@ pub enum ShowError {
 
 /// What every answer is made of.
 struct Shown {
-    films: Vec<Film>,
+    films: Vec<Staged>,
     stage: Stage,
     /// The films' numbers, as JSON.
     numbers: String,
-    /// One picture is drawn at a time, however many are asked for: a large one takes some ten megabytes and milliseconds.
-    drawing: Arc<Semaphore>,
+    /// However many are asked for: a large picture takes some ten megabytes and milliseconds.
+    drawing: OneAtATime,
 }
 
 /// What a page is told first.
@@ -65,10 +63,11 @@ pub fn serve(
     ready: impl FnOnce(SocketAddr),
 ) -> Result<(), ShowError> {
     let stage = Stage::of(cell)?;
-    let drawn = films.iter().any(|film| stage.shows(film));
-    let told = Told { title, drawn, films: films.iter().map(Film::numbers).collect() };
+    let films: Vec<Staged> = films.into_iter().map(|film| stage.film(film)).collect();
+    let drawn = films.iter().any(|staged| staged.framing.is_some());
+    let told = Told { title, drawn, films: films.iter().map(|staged| staged.film.numbers()).collect() };
     let numbers = serde_json::to_string(&told).expect("numbers have a JSON form");
-    let shown = Arc::new(Shown { films, stage, numbers, drawing: Arc::new(Semaphore::new(1)) });
+    let shown = Arc::new(Shown { films, stage, numbers, drawing: OneAtATime::new() });
     let routes = Router::new()
         .route("/", get(|| async { Html(PAGE) }))
         .route("/films.json", get(numbers_of))
@@ -90,17 +89,12 @@ async fn picture(State(shown): State<Arc<Shown>>, RawQuery(query): RawQuery) -> 
     let times = number("times").filter(|times| times.is_finite()).unwrap_or(1.0).clamp(0.0, MOST_TIMES);
     let size = [width as usize, (0.75 * width) as usize];
     let moment = place("film").zip(place("at"));
-    let Ok(turn) = Arc::clone(&shown.drawing).acquire_owned().await else {
-        return StatusCode::SERVICE_UNAVAILABLE.into_response();
-    };
-    // Beside the thread that answers, which stays free for other pages and for the end; who goes away keeps the turn until it is drawn.
-    let drawn = spawn_blocking(move || {
-        let _turn = turn;
+    let drawing = shown.drawing.clone();
+    let drawn = drawing.run(move || {
         let (film, at) = moment?;
-        let film = shown.films.get(film).filter(|film| shown.stage.shows(film))?;
-        shown.stage.picture(film, at, times, size)
+        shown.stage.picture(shown.films.get(film)?, at, times, size)
     });
-    match drawn.await.ok().flatten() {
+    match drawn.await.flatten() {
         Some(png) => ([(header::CONTENT_TYPE, "image/png")], png).into_response(),
         None => (StatusCode::NOT_FOUND, "no such moment: /films.json lists them").into_response(),
     }

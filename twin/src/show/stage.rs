@@ -3,7 +3,7 @@
 
 use super::film::{Film, Moment};
 use crate::arm::{Joints, ModelError};
-use crate::render::{Hand, Look, Mesh, Raster, RobotSurface, looks, points_of};
+use crate::render::{Framing, Hand, Look, Mesh, Raster, RobotSurface, looks, points_of};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use shared_mem::cell::Cell;
 use shared_mem::msg::image::PixelEncoding;
@@ -16,6 +16,14 @@ const TWIN: [u8; 3] = [40, 120, 200];
 const OVER: f64 = 0.4;
 /// Of so many moments of a film the extent is looked at.
 const LOOKED_AT: usize = 12;
+
+/// A film, and from where each of its pictures is taken.
+pub struct Staged {
+    /// What is shown.
+    pub film: Film,
+    /// `None` where nothing of it can be drawn.
+    pub(super) framing: Option<Framing>,
+}
 
 /// What is drawn of a cell.
 pub struct Stage {
@@ -35,17 +43,17 @@ impl Stage {
         Ok(Self { robot, object })
     }
 
-    /// Whether anything of a film can be drawn.
-    pub(super) fn shows(&self, film: &Film) -> bool {
-        film.moments().first().is_some_and(|first| self.points(first, 1.0).len() > 2)
+    /// A film, and from where all of it is seen.
+    pub fn film(&self, film: Film) -> Staged {
+        let every = film.moments().len().div_ceil(LOOKED_AT).max(1);
+        let points: Vec<_> = film.moments().iter().step_by(every).flat_map(|moment| self.points(moment, 1.0)).collect();
+        Staged { film, framing: (points.len() > 2).then(|| Framing::of(&points)) }
     }
 
     /// The picture of a moment as PNG, `times` as large a difference as there is; `None` where there is none.
-    pub fn picture(&self, film: &Film, moment: usize, times: f64, size: [usize; 2]) -> Option<Vec<u8>> {
-        let shown = film.moments().get(moment)?;
-        let every = film.moments().len().div_ceil(LOOKED_AT);
-        let all = film.moments().iter().step_by(every).flat_map(|moment| self.points(moment, 1.0));
-        let look = Look::at(&all.collect::<Vec<_>>(), size);
+    pub fn picture(&self, staged: &Staged, moment: usize, times: f64, size: [usize; 2]) -> Option<Vec<u8>> {
+        let shown = staged.film.moments().get(moment)?;
+        let look = staged.framing?.look(size);
         let [mut real, mut twin] = [(); 2].map(|()| look.raster(PAPER));
         if let (Some(robot), Some([q, _])) = (&self.robot, shown.joints) {
             look.draw_robot(&mut real, robot, &q, |_| None);
@@ -107,13 +115,13 @@ mod tests {
 
     #[test]
     fn the_difference_is_drawn_as_large_as_is_asked_for() {
-        let (stage, film) = (Stage::of(&shipped()).expect("a stage"), film());
-        assert!(stage.shows(&film));
+        let stage = Stage::of(&shipped()).expect("a stage");
+        let film = stage.film(film());
         let pixels = |times: f64| stage.picture(&film, 25, times, [160, 160]).expect("a picture");
         assert_ne!(pixels(1.0), pixels(50.0), "3 mrad are less than a pixel, and 150 are not");
         assert_eq!(pixels(0.0), pixels(0.0));
         assert!(stage.picture(&film, 100, 1.0, [160, 160]).is_none(), "there are a hundred moments");
-        let bare = Cell::default();
-        assert!(!Stage::of(&bare).expect("nothing to draw").shows(&film));
+        let bare = Stage::of(&Cell::default()).expect("nothing to draw");
+        assert!(bare.picture(&bare.film(film.film), 25, 1.0, [160, 160]).is_none());
     }
 }

@@ -3,10 +3,12 @@
 //! | file | owns |
 //! |---|---|
 //! | `hosts` | by which names a page may be opened |
+//! | `turns` | long work beside the thread that answers, one piece at a time |
 //!
 //! With the servers of [`crate::teleop`] and [`crate::show`] the only code that asks `axum` and `tokio`.
 
 mod hosts;
+mod turns;
 
 use axum::Router;
 use axum::extract::{Request, State};
@@ -19,6 +21,8 @@ use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+
+pub(crate) use turns::OneAtATime;
 
 /// How often it is looked whether to end.
 const POLL_PERIOD: Duration = Duration::from_millis(50);
