@@ -2,13 +2,16 @@
 //! by whatever needs the pose of a camera that a robot holds. And the pose of the end effector as lists of pictures hold it.
 #![allow(non_snake_case)] // O_T_EE and its kin are the Franka Control Interface's own symbols
 
-use crate::cell::Intrinsics;
+use crate::cell::{Cell, Intrinsics};
 use crate::frames::Pose;
+use crate::input;
 use crate::lens::Distortion;
 use crate::toml_file::{self, TomlFileError};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+
+const ASKED: &str = "where a camera is mounted is asked for: give a file that `calibration hand-eye BOARD --out hand_eye.toml` has written";
 
 /// Who holds the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -121,7 +124,8 @@ impl HandEye {
     /// # Errors
     /// [`TomlFileError`] when it cannot be read or is no such file.
     pub fn read(path: &Path) -> Result<Self, TomlFileError> {
-        toml_file::read(path)
+        let text = input::text(path, input::Kind::Configuration)?;
+        toml_file::parse(&text, path).map_err(|error| Cell::in_place_of(ASKED, &text, path, error))
     }
 
     /// The camera in the end effector's frame.
@@ -213,6 +217,15 @@ mod tests {
             let line = matrix(wrong).expect_err("no pose");
             assert!(!line.contains('\n'), "{line}");
         }
+    }
+
+    #[test]
+    fn a_cell_in_its_place_is_said_to_be_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("cell.toml");
+        std::fs::write(&path, include_str!("../../config/fr3_cell.toml")).expect("room");
+        let error = HandEye::read(&path).expect_err("a cell").to_string();
+        assert!(error.contains("describes a cell, and where a camera is mounted is asked for"), "{error}");
     }
 
     #[test]

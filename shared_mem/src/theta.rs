@@ -118,7 +118,8 @@ impl EffectTheta {
     }
 }
 
-const IS_A_CELL: &str = "describes a cell, and parameters are asked for: give a file that `calibration identify arm SESSION --out theta.toml` has written";
+const ASKED: &str =
+    "parameters are asked for: give a file that `calibration identify arm SESSION --out theta.toml` has written";
 
 impl Theta {
     /// Reads a theta.toml.
@@ -131,10 +132,8 @@ impl Theta {
         if let Some(what) = blocks::both_forms::<ObjectTheta>(&text) {
             return Err(content(what));
         }
-        let read: ThetaFile = toml_file::parse(&text, path).map_err(|error| match Cell::parse(&text, path) {
-            Ok(_) => content(IS_A_CELL.to_owned()),
-            Err(_) => error,
-        })?;
+        let read: ThetaFile =
+            toml_file::parse(&text, path).map_err(|error| Cell::in_place_of(ASKED, &text, path, error))?;
         blocks::check_names(&read.objects).map_err(content)?;
         Ok(read.into())
     }

@@ -58,6 +58,10 @@ impl FromStr for Slice {
 /// [`SweepError`] when there is no plan, or it is damaged.
 pub fn read(sweep: &Path) -> Result<Vec<Unit>, SweepError> {
     let file = sweep.join(UNITS);
+    if !file.exists() {
+        let what = "no sweep is planned there; plan one with `calibration sweep plan COMMANDS --out FOLDER`".to_owned();
+        return Err(SweepError::Content { file: sweep.to_owned(), what });
+    }
     let text = input::text(&file, input::Kind::List)?;
     let content = |what: String| SweepError::Content { file: file.clone(), what };
     let mut units: Vec<Unit> = Vec::new();

@@ -186,6 +186,27 @@ impl Cell {
         read.settle(path)
     }
 
+    /// What is said of a text that is none of what was asked for: where it is a cell.toml, that; else `error`.
+    ///
+    /// ```
+    /// # use shared_mem::{cell::Cell, toml_file};
+    /// # use std::path::Path;
+    /// let (text, path) = ("[table]\nheight = 0.02\n", Path::new("cell.toml"));
+    /// let error = toml_file::parse::<Vec<f64>>(text, path).unwrap_err();
+    /// let said = Cell::in_place_of("a list is asked for: give one", text, path, error).to_string();
+    /// assert_eq!(said, "cell.toml: describes a cell, and a list is asked for: give one");
+    /// ```
+    pub fn in_place_of(asked: &str, text: &str, path: &Path, error: TomlFileError) -> TomlFileError {
+        match Self::parse(text, path) {
+            Ok(_) => TomlFileError::Content {
+                path: path.to_owned(),
+                line: None,
+                what: format!("describes a cell, and {asked}"),
+            },
+            Err(_) => error,
+        }
+    }
+
     fn settle(mut self, path: &Path) -> Result<Self, CellError> {
         self.folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
         self.check().map_err(|what| CellError::Value { path: path.to_owned(), what })?;

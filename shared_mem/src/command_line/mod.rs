@@ -4,11 +4,13 @@
 //! | file | owns |
 //! |---|---|
 //! | `layout` | texts below the options: paragraphs, rows, and examples that can be typed as they stand |
+//! | `mistakes` | what is said of a command line that is wrong |
 //! | `numbers` | that numbers below zero are values |
 //! | `pages` | manual pages |
 //! | `placeholders` | what stands for a value, spelled alike |
 
 mod layout;
+mod mistakes;
 mod numbers;
 mod pages;
 mod placeholders;
@@ -16,6 +18,7 @@ mod placeholders;
 use crate::{answer, console, error_line, usage};
 use clap::{Arg, ArgMatches, Command, Parser, value_parser};
 use clap_complete::Shell;
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -75,14 +78,21 @@ pub fn fingerprint() -> &'static str {
 pub fn parse<A: Parser>(build: &Build) -> Result<A, ExitCode> {
     let _fingerprint = FINGERPRINT.get_or_init(|| build.fingerprint());
     let mut command = command::<A>(build);
-    let matches = command
-        .try_get_matches_from_mut(std::env::args_os())
-        .map_err(|error| usage::say(error.use_stderr(), error.render()))?;
+    let words: Vec<OsString> = std::env::args_os().collect();
+    let matches = command.try_get_matches_from_mut(&words).map_err(|error| refused(&error, &command, &words))?;
     match matches.subcommand() {
         Some((COMPLETIONS, asked)) => Err(completions(&mut command, asked)),
         Some((MANPAGES, asked)) => Err(manpages(self::command::<A>(build), asked)),
-        _ => A::from_arg_matches(&matches).map_err(|error| usage::say(error.use_stderr(), error.render())),
+        _ => A::from_arg_matches(&matches).map_err(|error| refused(&error, &command, &words)),
     }
+}
+
+fn refused(error: &clap::Error, command: &Command, words: &[OsString]) -> ExitCode {
+    if !error.use_stderr() {
+        return usage::say(false, error.render());
+    }
+    let words: Vec<String> = words.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+    usage::say(true, mistakes::text(error, command, &words))
 }
 
 /// A whole program: reads its command line and does what that says. What was said last is out when it ends.

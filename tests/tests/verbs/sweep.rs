@@ -114,7 +114,7 @@ fn units_that_fail_are_said_and_what_makes_no_sense_is_refused() {
     let again = run(&cell, plan);
     assert!(again.complaint().contains("not empty"), "{}", again.stderr);
     let none = run(&cell, "sweep local {dir}/nowhere");
-    assert!(none.complaint().contains("units.jsonl"), "{}", none.stderr);
+    assert!(none.complaint().contains("no sweep is planned there"), "{}", none.stderr);
     let slurm = run(&cell, "sweep slurm {dir}/sweep --slices 4 --time 00:10:00").succeeded();
     assert!(slurm.stdout.starts_with("#!/bin/bash\n") && slurm.stdout.contains("--array=1-4"));
     for (flag, value) in [("--time", "1;id"), ("--partition", "a\n#SBATCH --uid=0")] {

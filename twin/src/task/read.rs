@@ -15,12 +15,15 @@ use super::start::{StartError, StartRange};
 use super::surface::pose;
 use crate::world::{BodyPlan, Drive, Hold, JointKind, JointPlan, PlanError, World};
 use nalgebra::{Unit, Vector3};
+use shared_mem::cell::Cell;
 use shared_mem::input;
 use shared_mem::toml_file::{self, TomlFileError};
 use std::path::Path;
 
 /// Most bodies: contacts are looked for between any two.
 const MOST_BODIES: usize = 32;
+
+const ASKED: &str = "a task is asked for: give the file of one, or the name of a built-in one, as push_milk";
 
 /// What is wrong with a block: the key at fault, and what would do.
 type Fault = (&'static str, String);
@@ -40,7 +43,7 @@ pub(super) fn read(path: &Path) -> Result<Task, TomlFileError> {
 }
 
 pub(super) fn parse(text: &str, path: &Path) -> Result<Task, TomlFileError> {
-    let file: TaskFile = toml_file::parse(text, path)?;
+    let file: TaskFile = toml_file::parse(text, path).map_err(|error| Cell::in_place_of(ASKED, text, path, error))?;
     let source = Source { path, text };
     for (key, value) in [("horizon", file.horizon), ("hold", file.hold)] {
         if !(1e-3..=3600.0).contains(&value) {

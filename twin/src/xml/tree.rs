@@ -102,7 +102,7 @@ impl Element {
         match (root, open.is_empty()) {
             (Some(root), true) => Ok(root),
             (_, false) => Err("its end is missing".into()),
-            (None, true) => Err("it holds no element".into()),
+            (None, true) => Err("it holds no element, so it is no XML file".into()),
         }
     }
 

@@ -33,6 +33,13 @@ fn the_scripted_motion_of_each_task_succeeds_from_ten_starts() {
 }
 
 #[test]
+fn a_cell_in_the_place_of_a_task_is_said_to_be_one() {
+    let cell = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/fr3_cell.toml");
+    let error = Task::read(&cell).expect_err("a cell").to_string();
+    assert!(error.contains("describes a cell, and a task is asked for"), "{error}");
+}
+
+#[test]
 fn a_start_is_that_of_its_seed_and_another_seed_has_another() {
     let task = Task::read(&shipped("stack_boxes.toml")).expect("a task");
     let [one, again, other] =
