@@ -70,6 +70,18 @@ pub struct Comparison {
     pub p: Option<f64>,
 }
 
+/// Most chance of a parting by luck with which two shares are told apart (a choice, that of their intervals).
+const LUCK: f64 = 0.05;
+
+impl Comparison {
+    /// Whether the trials tell which share is larger: by the interval, and by McNemar's exact test where there are pairs. Of few
+    /// pairs the interval alone is too sure: four of four against none has one without 0 and a chance of 1/8.
+    pub fn tells_apart(&self) -> bool {
+        let [low, high] = self.interval;
+        (low > 0.0 || high < 0.0) && self.p.is_none_or(|p| p <= LUCK)
+    }
+}
+
 /// Two worlds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WorldPair {
@@ -251,6 +263,17 @@ mod tests {
                 progress: Some(0.5),
             })
             .collect()
+    }
+
+    #[test]
+    fn four_of_four_against_none_are_too_few_to_tell_and_six_of_six_are_enough() {
+        let told = |count| {
+            let given = [trials("twin", "a", count, count), trials("twin", "b", 0, count)].concat();
+            let comparison = findings(&given, &[], 1).policies[0].comparison;
+            assert!(comparison.interval[0] > 0.0, "{comparison:?}");
+            comparison.tells_apart()
+        };
+        assert_eq!([4, 6].map(told), [false, true]);
     }
 
     #[test]

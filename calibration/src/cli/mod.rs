@@ -193,7 +193,7 @@ fn run_to_the_end(verb: Verb, interrupt: &Interrupt) -> anyhow::Result<()> {
             print(arguments.json, &found, terminal::diagnosis(&found))
         }
         Verb::Check(arguments) => check::run(&arguments),
-        Verb::Viewpoint(arguments) => viewpoint::run(*arguments),
+        Verb::Viewpoint(arguments) => viewpoint::run(*arguments, interrupt),
         Verb::HandEye(arguments) => hand_eye::run(arguments),
         Verb::Import(arguments) => import::run(&arguments),
         Verb::Init(arguments) => init::run(*arguments),

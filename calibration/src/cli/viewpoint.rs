@@ -2,6 +2,7 @@
 
 use super::print;
 use clap::{Args, ValueEnum};
+use inference::interrupt::Interrupt;
 use shared_mem::output::Destination;
 use shared_mem::quantity::{self, number};
 use shared_mem::recording::PictureKind;
@@ -131,7 +132,7 @@ fn start(text: &str) -> Result<StartFrom, String> {
 ///
 /// # Errors
 /// One line: what happened, and what to do.
-pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
+pub(super) fn run(arguments: ViewpointArguments, interrupt: &Interrupt) -> anyhow::Result<()> {
     let ViewpointArguments { targets, cell, joints, mask, background, intrinsics, start, reach, .. } = arguments;
     let start = match (arguments.board, arguments.board_at) {
         (Some(board), Some((position, wxyz))) => StartFrom::Board(board, position, wxyz),
@@ -142,7 +143,7 @@ pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
         MethodName::Swarm => Method::Swarm(arguments.budget as usize),
     };
     Destination::apart(&[arguments.out.as_deref(), arguments.report.as_deref()])?;
-    let found = find(&Options {
+    let options = Options {
         targets,
         cell,
         joints,
@@ -162,7 +163,8 @@ pub(super) fn run(arguments: ViewpointArguments) -> anyhow::Result<()> {
         seed: arguments.seed,
         out: Destination::of(arguments.out.as_deref(), arguments.force)?,
         report: Destination::of(arguments.report.as_deref(), arguments.force)?,
-    })?;
+    };
+    let found = find(&options, interrupt)?;
     print(arguments.json, &found, in_words(&found))
 }
 

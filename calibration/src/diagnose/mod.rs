@@ -80,7 +80,8 @@ pub fn diagnose_kept(
     options: &Options,
     interrupt: &Interrupt,
 ) -> Result<(Diagnosis, Arc<Kept>), DiagnoseError> {
-    let interrupt = &interrupt.within(options.budget);
+    // A tenth is left to conclude.
+    let interrupt = &interrupt.within(options.budget.map(|budget| budget * 9 / 10));
     let session = &as_asked(session, options)?;
     let (session, admitted) = match prepared(session, options, interrupt) {
         Err(DiagnoseError::Refused(Refused::NotTestable(why))) => {

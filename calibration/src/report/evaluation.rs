@@ -61,12 +61,12 @@ pub fn sentence(findings: &Findings) -> String {
 /// Which policy beats which by most, where there are several.
 fn better(findings: &Findings) -> Option<String> {
     let of = |pair: &&PolicyPair| pair.comparison.difference.abs();
-    let excludes_none = |pair: &&PolicyPair| pair.comparison.interval[0] > 0.0 || pair.comparison.interval[1] < 0.0;
+    let told_apart = |pair: &&PolicyPair| pair.comparison.tells_apart();
     let all = &findings.policies;
     if all.is_empty() {
         return None;
     }
-    let Some(most) = all.iter().filter(excludes_none).max_by(|a, b| of(a).total_cmp(&of(b))) else {
+    let Some(most) = all.iter().filter(told_apart).max_by(|a, b| of(a).total_cmp(&of(b))) else {
         return Some("Too few trials to tell the policies apart.".into());
     };
     let Comparison { difference, interval: [low, high], .. } = most.comparison;
@@ -75,7 +75,7 @@ fn better(findings: &Findings) -> Option<String> {
         if difference > 0.0 { (first, second, [low, high]) } else { (second, first, [-high, -low]) };
     let several = all.iter().any(|pair| pair.world != most.world);
     let world = if several { format!(" in {}", most.world) } else { String::new() };
-    let others = all.iter().filter(excludes_none).count() - 1;
+    let others = all.iter().filter(told_apart).count() - 1;
     let others = match others {
         0 => String::new(),
         1 => "; 1 other pair differs as well".to_owned(),
@@ -381,10 +381,10 @@ mod tests {
         let policies = ["expert", "worse=expert:noise=0.05", "worst=expert:noise=0.3"];
         let asking = Asking { keys: Keys::default(), actions: ActionKind::Recorded, rate: 20, chunk: None };
         let policies = policies.iter().map(|text| text.parse().expect("a policy")).collect();
-        let plan = Plan { policies, worlds: vec![world], episodes: 4, seed: 0, asking };
+        let plan = Plan { policies, worlds: vec![world], episodes: 6, seed: 0, asking };
         let done = run(&plan, Kept::nothing(), &Interrupt::default()).expect("trials");
         let again = run(&plan, Kept::nothing(), &Interrupt::default()).expect("trials");
-        assert!(done == again && done.len() == 12 && done.iter().any(|done| !done.outcome.success));
+        assert!(done == again && done.len() == 18 && done.iter().any(|done| !done.outcome.success));
         let mut trials: Vec<Trial> = done.iter().map(|done| done.trial.clone()).collect();
         let robot = trials.clone().into_iter().map(|trial| Trial { world: "robot".into(), ..trial });
         trials.extend(robot.collect::<Vec<_>>());
@@ -393,7 +393,7 @@ mod tests {
         for text in ["worst", "that in robot", "data:image/png;base64,", "milk in place at groove", "McNemar"] {
             assert!(page.contains(text), "no {text}");
         }
-        assert!(words(&found, Path::new("out")).contains("4 of 4"));
+        assert!(words(&found, Path::new("out")).contains("6 of 6"));
         let alone = Findings { worlds: Vec::new(), ..found };
         assert!(sentence(&alone).starts_with("expert beats worst on push_milk"), "{}", sentence(&alone));
         let few = Findings {

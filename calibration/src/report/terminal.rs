@@ -86,7 +86,7 @@ pub fn diagnosis(diagnosis: &Diagnosis) -> String {
     }
     let verdict = &diagnosis.verdict;
     lines.extend(confidence(verdict).map(|(value, what)| format!("confidence: {value}, {what}")));
-    lines.push(format!("{}: {}", verdict_words(verdict.kind), verdict.text));
+    lines.push(format!("{}: {}", verdict_words(diagnosis), verdict.text));
     lines.join("\n")
 }
 

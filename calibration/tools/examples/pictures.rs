@@ -1,15 +1,20 @@
-//! The pictures of the documents: `cargo run --release -p tools --example pictures -- docs/pictures`. A session with a payload in it that
-//! its cell.toml does not know is made and diagnosed; the figures of its page, and robot and twin at the moment at which they are
-//! furthest apart, are written as pictures of their own.
+//! The pictures of the documents, by the programs as they were built before:
+//!
+//! `cargo build --release --workspace && cargo run --release --workspace --example pictures -- docs/pictures`
+//!
+//! A session with a payload in it that its cell.toml does not know is made and diagnosed; the figures of its page, and robot and twin at
+//! the moment at which they are furthest apart, are written as pictures of their own. Beside them, of the simulated cell: a clip as
+//! `check` shows it, the stroke that is recorded next, the robot's outline in a picture of the camera, a task, and policies compared.
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use calibration::demo::example::Order;
 use calibration::diagnose::{Options, diagnose};
 use calibration::report::diagnosis::page;
 use inference::interrupt::Interrupt;
-use shared_mem::output;
 use shared_mem::recording::Session;
-use std::path::PathBuf;
+use shared_mem::{input, output};
+use std::path::{Path, PathBuf};
+use std::process::Command;
 use twin::replay::Replayer;
 use twin::show::{Film, Stage};
 
@@ -36,22 +41,105 @@ fn main() -> anyhow::Result<()> {
     order.write()?;
     let session = Session::open(&order.out)?;
     let html = page(&diagnose(&session, &Options::default(), &Interrupt::default())?);
-    let style = style(&html).context("a page without a style")?;
     for (shows, name) in FIGURES {
-        let label = format!("aria-label=\"{shows}\"");
-        let figure = figures(&html).find(|figure| figure.contains(&label)).with_context(|| format!("no {shows}"))?;
-        let file = folder.join(format!("{name}.svg"));
-        output::write(&file, alone(figure, &style))?;
-        eprintln!("{}", file.display());
+        write(&folder.join(name).with_extension("svg"), figure(&html, shows)?)?;
     }
     let (clip, prediction, _) = Replayer::new(&session.cell, None)?.replay(session.read(&session.clips[0])?)?;
     let film = Film::of("clip_00.mcap", &clip, &prediction).context("a clip of the arm")?;
     let (stage, widest) = (Stage::of(&session.cell)?, film.widest());
     let twin = stage.picture(&stage.film(film), widest, TIMES, SIZE).context("the arm's shape")?;
-    let file = folder.join("twin.png");
-    output::write(&file, twin)?;
+    write(&folder.join("twin.png"), twin)?;
+    for Drawn { by, file, shows, name } in &DRAWN {
+        for line in *by {
+            run(line, made.path())?;
+        }
+        let drawn = made.path().join(file);
+        let file = input::bytes(&drawn, input::Kind::Picture)?;
+        let content = match shows {
+            Some(shows) => figure(&String::from_utf8(file)?, shows)?.into_bytes(),
+            None => file,
+        };
+        write(&folder.join(name), content)?;
+    }
+    Ok(())
+}
+
+/// A picture that programs draw.
+struct Drawn {
+    /// Command lines, one after the other, in a folder that holds `session`.
+    by: &'static [&'static str],
+    /// The file with the picture.
+    file: &'static str,
+    /// What its figure shows, where the file is a page.
+    shows: Option<&'static str>,
+    name: &'static str,
+}
+
+const DRAWN: [Drawn; 5] = [
+    Drawn {
+        by: &["calibration check session --report check.html"],
+        file: "check.html",
+        shows: Some("clip_00.mcap, joint 4 `fr3_joint4`"),
+        name: "check.svg",
+    },
+    Drawn {
+        by: &["calibration capture control-hit-slide --cell fr3 --arm sim --clips 8 --out strokes --preview stroke.svg"],
+        file: "stroke.svg",
+        shows: None,
+        name: "stroke.svg",
+    },
+    Drawn {
+        by: &[
+            "calibration capture excitation --cell fr3 --arm sim --clips 1 --out seen",
+            "calibration viewpoint seen --color --report outline.png",
+        ],
+        file: "outline.png",
+        shows: None,
+        name: "outline.png",
+    },
+    Drawn {
+        by: &[
+            "twin task pick_carrot --record carrot",
+            "calibration export-episodes pick_carrot carrot --to png --every 20 --out carrot_pictures",
+        ],
+        file: "carrot_pictures/episode_000000/front_color_00014.png",
+        shows: None,
+        name: "task.png",
+    },
+    Drawn {
+        by: &[
+            "calibration evaluate --policies expert shaky=expert:noise=0.02 --tasks push_milk --worlds twin --episodes 20 --out evaluation",
+        ],
+        file: "evaluation/report.html",
+        shows: Some("parameters with intervals"),
+        name: "policies.svg",
+    },
+];
+
+/// Runs a command line of a program that stands where this one was built.
+fn run(line: &str, folder: &Path) -> anyhow::Result<()> {
+    let own = std::env::current_exe()?;
+    let built = own.parent().and_then(Path::parent).context("a program without a folder")?;
+    let mut words = line.split(' ');
+    let program = built.join(words.next().unwrap_or_default());
+    let ended = Command::new(&program).args(words).current_dir(folder).output();
+    let ended = ended.with_context(|| format!("cannot start {}; build it first", program.display()))?;
+    ensure!(ended.status.success(), "`{line}`: {}", String::from_utf8_lossy(&ended.stderr));
+    Ok(())
+}
+
+fn write(file: &Path, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
+    output::write(file, content)?;
     eprintln!("{}", file.display());
     Ok(())
+}
+
+/// The figure of a page that says that it shows this, as a file of its own.
+fn figure(html: &str, shows: &str) -> anyhow::Result<String> {
+    let style = style(html).context("a page without a style")?;
+    let label = format!("aria-label=\"{shows}\"");
+    let figure = figures(html).find(|figure| figure.contains(&label)).with_context(|| format!("no {shows}"))?;
+    Ok(alone(figure, &style))
 }
 
 /// The figures of a page.

@@ -47,12 +47,14 @@ pub fn page(diagnosis: &Diagnosis) -> String {
 }
 
 /// The verdict in a few words.
-pub(super) fn verdict_words(kind: Kind) -> &'static str {
-    match kind {
+pub(super) fn verdict_words(diagnosis: &Diagnosis) -> &'static str {
+    match diagnosis.verdict.kind {
         Kind::None => "no gap beyond the noise",
         Kind::Named => "cause named",
         Kind::Class => "one of several causes",
         Kind::Unexplained => "cause unknown",
+        // More time would tell, and no other clips are needed.
+        Kind::NotTestable if diagnosis.budget_spent => "time is up",
         Kind::NotTestable => "not testable",
     }
 }
@@ -94,7 +96,7 @@ fn head(diagnosis: &Diagnosis) -> Markup {
     let sure = confidence(verdict).map(|(value, what)| (value, format!("confidence: {what}")));
     entries.extend(sure.iter().map(|(value, what)| (value.clone(), what.as_str())));
     html! {
-        p.kicker { "Diagnosis of " b { (diagnosis.session) } ": " (verdict_words(verdict.kind)) }
+        p.kicker { "Diagnosis of " b { (diagnosis.session) } ": " (verdict_words(diagnosis)) }
         h1 { (unbroken(&verdict.text)) }
         @if !entries.is_empty() { (facts(&entries)) }
     }
@@ -358,5 +360,8 @@ pub(super) mod tests {
                 && !html.contains("How large the gap is")
                 && !html.contains("Candidates")
         );
+        diagnosis.budget_spent = true;
+        let html = page(&diagnosis);
+        assert!(html.contains("time is up") && !html.contains("not testable"), "a longer budget would tell");
     }
 }

@@ -2,6 +2,9 @@
 
 use super::interval::Interval;
 use serde::Serialize;
+use shared_mem::cell::Cell;
+use shared_mem::{input, toml_file};
+use std::path::Path;
 
 /// The answer of `calibration viewpoint`.
 #[derive(Debug, Clone, Serialize)]
@@ -64,4 +67,13 @@ pub struct FrameAnswer {
     pub loss: f64,
     /// Where the robot's joint origins and the flange are in it: column and row [pixel], free of distortion.
     pub joints_px: Vec<[f64; 2]>,
+}
+
+/// The cell's text; of a file that is there, all but the camera's block stays as a person wrote it.
+pub(super) fn cell_text(cell: &Cell, file: &Path) -> String {
+    let before = input::text(file, input::Kind::Configuration).ok().filter(|_| file.is_file());
+    let camera = Cell { camera: cell.camera.clone(), ..Cell::default() };
+    before
+        .and_then(|before| toml_file::updated(&before, &camera.to_toml(), &[]))
+        .unwrap_or_else(|| cell.at_home_anywhere().to_toml())
 }

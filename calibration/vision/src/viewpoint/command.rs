@@ -1,6 +1,6 @@
 //! `calibration viewpoint`: from what was given to the answer.
 
-use super::answer::{FrameAnswer, Pose, Start, Viewpoint};
+use super::answer::{FrameAnswer, Pose, Start, Viewpoint, cell_text};
 use super::board::Board;
 use super::fit::{Fit, Method, fit};
 use super::frame::Frame;
@@ -9,8 +9,10 @@ use super::moment::Moment;
 use super::picture::Pixels;
 use super::search::Reach;
 use super::shape::Shape;
-use super::{overlay, refine, session, start, step};
+use super::{kept, overlay, refine, session, start, step};
 use anyhow::{Context as _, bail, ensure};
+use inference::interrupt::Interrupt;
+use inference::kept::for_work;
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion};
 use shared_mem::cell::{Camera, CameraPose, Cell, Intrinsics, Robot};
 use shared_mem::frames::{Base, Camera as CameraFrame, Pose as FramePose};
@@ -18,7 +20,7 @@ use shared_mem::lens::calibration::Calibration;
 use shared_mem::output::Destination;
 use shared_mem::recording::{PictureKind, Session, write_png_to};
 use shared_mem::statistics::median;
-use shared_mem::{ending, input, toml_file};
+use shared_mem::{ending, typed};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use twin::arm::{Joints, MAX_JOINTS};
@@ -109,8 +111,8 @@ struct Prepared {
 /// Finds the pose.
 ///
 /// # Errors
-/// One line: what is missing or does not fit together, and what to do.
-pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
+/// One line: what is missing or does not fit together, and what to do; after an interruption, what was kept.
+pub fn run(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Viewpoint> {
     let began = Instant::now();
     let Prepared { mut cell, camera, lens, shape, frames, pixels, mut warnings } = prepared(options)?;
     let method = options.method;
@@ -132,16 +134,20 @@ pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
         StartFrom::Search => None,
     };
     let start = start.map(|pose| pose.inverse().isometry());
+    let answer_file = options.out.as_ref().or(options.report.as_ref()).map(Destination::path);
+    let asked = kept::question(options, (&cell, &camera), &frames, &pixels);
+    let work = for_work(answer_file, &options.targets[0], "viewpoint", &asked, interrupt);
     let found = match (&start, &options.start) {
         (Some(start), _) => fit(&frames, &shape, start, &reach, method, options.seed),
-        (None, StartFrom::Search) => start::search(&frames, &shape, &lens, method, options.seed),
+        (None, StartFrom::Search) => start::search(&frames, &shape, &lens, (method, options.seed), &work),
         (None, _) => {
             bail!(
                 "no start: cell.toml has no `[camera] pose`; give --start x,y,z,qw,qx,qy,qz, --board, or --start search"
             )
         }
     };
-    ensure!(!ending::asked(), "interrupted; nothing was written, start again");
+    ensure!(!ending::asked(), "{}", work.farewell(&typed::command()));
+    interrupt.work_is_over();
     let found = found?;
     if found.rival.is_some_and(|rival| rival > 0.95 * found.confirmed) {
         warnings.push("another pose explains the pictures nearly as well; add a picture of another arm pose".into());
@@ -159,16 +165,8 @@ pub fn run(options: &Options) -> anyhow::Result<Viewpoint> {
         let (width, height, rgb) = overlay::sheet(&frames, &pixels, &shape, &found.camera_from_base, start.as_ref());
         write_png_to(report, width, height, &rgb)?;
     }
+    work.done();
     Ok(answer)
-}
-
-/// The cell's text; of a file that is there, all but the camera's block stays as a person wrote it.
-fn cell_text(cell: &Cell, file: &Path) -> String {
-    let before = input::text(file, input::Kind::Configuration).ok().filter(|_| file.is_file());
-    let camera = Cell { camera: cell.camera.clone(), ..Cell::default() };
-    before
-        .and_then(|before| toml_file::updated(&before, &camera.to_toml(), &[]))
-        .unwrap_or_else(|| cell.at_home_anywhere().to_toml())
 }
 
 /// Kinds of pictures to try, the better first.

@@ -10,6 +10,7 @@ use nalgebra::{Isometry3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use shared_mem::progress::{Planned, Progress};
 use std::sync::atomic::{AtomicU64, Ordering};
 use twin::pose_fit::moved;
@@ -39,7 +40,7 @@ pub struct Fit {
     pub drawings: usize,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 pub enum NoFit {
     /// Too little of the robot is where the camera looks.
     #[error(

@@ -13,7 +13,7 @@ use inference::estimate::interval::LEVEL;
 use inference::estimate::sandwich::{Witness, covariance};
 use inference::statistics::student;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector6};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Fewer frames than this are no sample of their own.
 const FRAMES: usize = 4;
@@ -21,7 +21,7 @@ const FRAMES: usize = 4;
 const THICKNESS: f64 = 0.2;
 
 /// Half-widths of 95 % intervals, axes of the base frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// Camera position [m].
     pub position: [f64; 3],

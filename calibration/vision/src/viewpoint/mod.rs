@@ -11,7 +11,7 @@
 //! | [`shape`], [`outline`] | the robot's meshes, and their outline from a pose |
 //! | [`scan`], [`refine`], [`fit`] | the fast way: look everywhere, least squares, keep the best |
 //! | [`search`] | the paper's way: a particle swarm |
-//! | [`start`] | a start where none is known |
+//! | [`start`], `kept` | a start where none is known, and what an interrupted search for one goes on from |
 //! | [`board`], [`lattice`], [`dictionary`], [`planar`] | a start from a ChArUco board at a known place: what it looks like, its crossings, its markers, where it stands |
 //! | [`interval`] | how sure the pose is |
 //! | [`grid`], [`lens`], [`step`], `distance` | pictures of numbers, projection, moves of a camera |
@@ -26,6 +26,7 @@ pub mod fit;
 pub mod frame;
 pub mod grid;
 pub mod interval;
+mod kept;
 pub mod lattice;
 pub mod lens;
 pub mod moment;

@@ -2,10 +2,12 @@
 
 use super::fit::{BEGIN, Fit, Method, NoFit, fit_shown, plan};
 use super::frame::Frame;
+use super::kept::{KeptFit, KeptPose, Seen};
 use super::lens::Lens;
 use super::scan::scan;
 use super::search::Reach;
 use super::shape::Shape;
+use inference::kept::{Fingerprint, Kept};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use shared_mem::progress::{Planned, Progress};
 
@@ -21,11 +23,17 @@ const FOLLOWED: usize = 5;
 /// The stage in which they are looked from, beside those of a fit as one photo took them.
 const PLACES_STAGE: Planned = ("places", 46.0);
 
-/// The pose that explains the frames best, from anywhere around the robot.
+/// The pose that explains the frames best, from anywhere around the robot. Every place and every fit is a step that is kept.
 ///
 /// # Errors
 /// As [`fit`].
-pub fn search(frames: &[Frame], shape: &Shape, lens: &Lens, method: Method, seed: u64) -> Result<Fit, NoFit> {
+pub fn search(
+    frames: &[Frame],
+    shape: &Shape,
+    lens: &Lens,
+    (method, seed): (Method, u64),
+    kept: &Kept,
+) -> Result<Fit, NoFit> {
     let reach = Reach { angle: TURN, distance: 0.0 };
     let mut seen = Vec::new();
     let mut drawings = 0;
@@ -41,16 +49,22 @@ pub fn search(frames: &[Frame], shape: &Shape, lens: &Lens, method: Method, seed
         let away =
             DISTANCES[place / BEARINGS / HEIGHTS.len()] * (lens.focal[1] / (2.0 * lens.centre[1].max(1.0))).max(0.5);
         let from = Vector3::new(around.cos() * height.cos(), around.sin() * height.cos(), height.sin()) * away;
-        let (candidates, drawn) = scan(&frames[..1], shape, &looking(&from), &reach, 1, || ());
+        let Seen { best, drawings: drawn } = kept.once(&Fingerprint::of("place").with(&place), || {
+            let (candidates, drawings) = scan(&frames[..1], shape, &looking(&from), &reach, 1, || ());
+            let best = candidates.first().map(|best| (KeptPose::of(&best.camera_from_base), best.loss));
+            Seen { best, drawings }
+        });
         bar.show(place as u64 + 1, PLACES_STAGE.0);
         drawings += drawn;
-        seen.extend(candidates);
+        seen.extend(best);
     }
-    seen.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    seen.sort_by(|a, b| a.1.total_cmp(&b.1));
     let reach = Reach { angle: 0.3, distance: 0.3 };
     let mut best: Result<Fit, NoFit> = Err(NoFit::OutOfView);
-    for candidate in seen.iter().take(FOLLOWED) {
-        let found = fit_shown(frames, shape, &candidate.camera_from_base, (&reach, method, seed), &bar);
+    for (number, (start, _)) in seen.iter().take(FOLLOWED).enumerate() {
+        let step = Fingerprint::of("followed").with(&number);
+        let follow = || fit_shown(frames, shape, &start.pose(), (&reach, method, seed), &bar).map(KeptFit::of);
+        let found = kept.once(&step, follow).map(KeptFit::fit);
         drawings += found.as_ref().map_or(0, |found| found.drawings);
         best = match (best, found) {
             (Ok(best), Ok(found)) if found.confirmed > best.confirmed => Ok(found),

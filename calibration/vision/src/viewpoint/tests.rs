@@ -9,6 +9,7 @@ use super::outline::Outliner;
 use super::search::Reach;
 use super::shape::Shape;
 use super::{depth, step};
+use inference::interrupt::Interrupt;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use shared_mem::cell::{Camera, Cell};
 use shared_mem::frames::Pose;
@@ -141,7 +142,7 @@ fn a_robot_outside_of_the_view_is_said_to_be_there() {
 fn a_plain_photo_is_enough_and_the_answer_goes_into_the_cell() {
     let (cell, folder) = (shipped(), tempfile::tempdir().expect("a folder"));
     let options = photo(&cell, folder.path());
-    let found = run(&options).expect("a pose");
+    let found = run(&options, &Interrupt::default()).expect("a pose");
     let truth = truth(&cell).inverse();
     let distance = (truth.translation.vector - Vector3::from(found.camera.position)).norm();
     assert!(distance < 0.02, "{distance} m off");
@@ -159,7 +160,11 @@ fn depth_is_tried_before_colour_unless_something_else_was_asked_for() {
     assert_eq!(kinds(&options), [PictureKind::Depth, PictureKind::Color]);
     assert_eq!(kinds(&Options { kind: Some(PictureKind::Color), ..options.clone() }), [PictureKind::Color]);
     assert_eq!(kinds(&Options { background: Some("empty.png".into()), ..options.clone() }), [PictureKind::Color]);
-    assert_eq!(run(&options).expect("a pose").pictures, "color", "files are of the kind they are");
+    assert_eq!(
+        run(&options, &Interrupt::default()).expect("a pose").pictures,
+        "color",
+        "files are of the kind they are"
+    );
 }
 
 #[test]
@@ -183,7 +188,7 @@ fn what_cannot_be_fitted_is_refused_in_one_line() {
         (Options { method: Method::Swarm(100), ..options }, "silhouettes"),
     ];
     for (options, expected) in refused {
-        let error = run(&options).expect_err(expected);
+        let error = run(&options, &Interrupt::default()).expect_err(expected);
         let line = shared_mem::error_line(error.as_ref());
         assert!(line.contains(expected) && !line.contains('\n'), "{line}");
     }
