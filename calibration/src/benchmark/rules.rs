@@ -13,7 +13,6 @@ use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use crate::diagnose::fit::{floor, shortlist};
 use inference::admit::Split;
 use inference::estimate::quadratic::minimum;
-use inference::likelihood::Evidence;
 use inference::likelihood::random_effects::RandomEffects;
 use nalgebra::DMatrix;
 
@@ -23,7 +22,7 @@ pub const NAMES: [&str; 3] = ["largest error", "fit everything", "sample BIC"];
 const SIGNIFICANT: f64 = 3.0;
 
 /// What each rule says.
-pub fn all<E: Evidence>(bench: &Bench<'_, E>, split: &Split, baseline: &Hypothesis) -> Vec<Said> {
+pub fn all(bench: &Bench<'_>, split: &Split, baseline: &Hypothesis) -> Vec<Said> {
     let clips: Vec<(usize, Vec<f64>)> = split.train.iter().map(|clip| (*clip, Vec::new())).collect();
     let probed: Vec<usize> = (0..bench.library.candidates.len()).collect();
     let (full, free) = (&baseline.full[..], &baseline.free[..]);
@@ -51,7 +50,7 @@ fn said(ranking: &[&str]) -> Said {
     }
 }
 
-fn largest_error<E: Evidence>(bench: &Bench<'_, E>, swept: &Swept) -> Said {
+fn largest_error(bench: &Bench<'_>, swept: &Swept) -> Said {
     let channels = bench.evidence.channels();
     let mut sums = vec![(0.0, 0.0); channels.len()];
     for clip in &swept.clips {
@@ -77,7 +76,7 @@ fn first_forms(swept: &Swept) -> Vec<usize> {
     (swept.columns.iter().enumerate()).filter(|(_, column)| first(column)).map(|(at, _)| at + 1).collect()
 }
 
-fn everything<E: Evidence>(bench: &Bench<'_, E>, swept: &Swept, sum: &DMatrix<f64>) -> Said {
+fn everything(bench: &Bench<'_>, swept: &Swept, sum: &DMatrix<f64>) -> Said {
     let mut form = sum.clone();
     shortlist::hold_numbers(&mut form, &swept.columns, bench.library);
     let used = first_forms(swept);
@@ -96,7 +95,7 @@ fn everything<E: Evidence>(bench: &Bench<'_, E>, swept: &Swept, sum: &DMatrix<f6
     said(&ranked(bench, strengths))
 }
 
-fn sample_bic<E: Evidence>(bench: &Bench<'_, E>, swept: &Swept, sum: &DMatrix<f64>, rows: usize) -> Said {
+fn sample_bic(bench: &Bench<'_>, swept: &Swept, sum: &DMatrix<f64>, rows: usize) -> Said {
     let price = (rows as f64).ln();
     let gains = shortlist::score(swept, sum, bench.library);
     let better = gains.iter().map(|scored| (scored.gain - price * scored.cost as f64, scored.candidate));
@@ -104,7 +103,7 @@ fn sample_bic<E: Evidence>(bench: &Bench<'_, E>, swept: &Swept, sum: &DMatrix<f6
 }
 
 /// Names, the strongest first, each once.
-fn ranked<'a, E: Evidence>(bench: &Bench<'a, E>, mut strengths: Vec<(f64, usize)>) -> Vec<&'a str> {
+fn ranked<'a>(bench: &Bench<'a>, mut strengths: Vec<(f64, usize)>) -> Vec<&'a str> {
     strengths.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut names = Vec::new();
     for (_, candidate) in strengths {

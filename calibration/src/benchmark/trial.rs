@@ -74,7 +74,7 @@ struct TrialContext<'a> {
 }
 
 impl TrialContext<'_> {
-    fn cases<E: Evidence>(&self, evidence: &E, found: &Diagnosis) -> Result<Vec<Case>, DiagnoseError> {
+    fn cases(&self, evidence: &Evidence<'_>, found: &Diagnosis) -> Result<Vec<Case>, DiagnoseError> {
         let bench = Bench::new(evidence, self.library, self.interrupt, (Kept::nothing(), ""));
         let even = floor::sensors_alone(evidence);
         let bar = Progress::new("baseline", baseline::steps(self.admitted.with_object));
@@ -96,7 +96,7 @@ impl TrialContext<'_> {
     }
 
     /// What the true structure, fitted from its true numbers on, gains on clips never used: detectability and shrink.
-    fn oracle<E: Evidence>(&self, bench: &Bench<'_, E>, baseline: &Hypothesis, even: &[f64]) -> (f64, f64) {
+    fn oracle(&self, bench: &Bench<'_>, baseline: &Hypothesis, even: &[f64]) -> (f64, f64) {
         let Truth::Effects(names) = &self.world.truth else { return (0.0, 0.0) };
         let candidate = |name: &String| self.library.candidates.iter().position(|c| c.effect.name == name);
         let effects: Vec<usize> = names.iter().filter_map(candidate).collect();

@@ -52,7 +52,7 @@ use inference::controller;
 use inference::engine::{Engine, Quantity, Used};
 use inference::interrupt::Interrupt;
 use inference::kept::{Fingerprint, Kept};
-use inference::likelihood::{Evidence, setting};
+use inference::likelihood::setting;
 use search::baseline::Baseline;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Session;
@@ -184,7 +184,7 @@ struct Cause<'a> {
 impl Question for Cause<'_> {
     type Answer = Diagnosis;
 
-    fn examine<E: Evidence>(&self, bench: &Bench<'_, E>) -> Result<Diagnosis, DiagnoseError> {
+    fn examine(&self, bench: &Bench<'_>) -> Result<Diagnosis, DiagnoseError> {
         let Self { session, admitted, split, options } = self;
         let bar = Progress::planned(
             "diagnose",

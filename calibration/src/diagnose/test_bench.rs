@@ -45,7 +45,7 @@ pub(super) fn truth(library: &Library, world: &World) -> Vec<f64> {
 }
 
 /// A bench of any evidence; nothing of its work is kept.
-pub(super) fn bench<'a, E: Evidence>(evidence: &'a E, library: &'a Library, interrupt: &'a Interrupt) -> Bench<'a, E> {
+pub(super) fn bench<'a>(evidence: &'a Evidence<'a>, library: &'a Library, interrupt: &'a Interrupt) -> Bench<'a> {
     Bench::new(evidence, library, interrupt, (Kept::nothing(), ""))
 }
 
@@ -53,7 +53,7 @@ pub(super) fn bench<'a, E: Evidence>(evidence: &'a E, library: &'a Library, inte
 pub(super) fn on_bench<R>(
     (cell, world): (&Cell, &World),
     library: &Library,
-    ask: impl FnOnce(&Bench<'_, ArmClips<Parameters<'_>>>, &[f64]) -> R,
+    ask: impl FnOnce(&Bench<'_>, &[f64]) -> R,
 ) -> R {
     let theta = |numbers: &[f64]| library.theta(numbers);
     let clips = record(world, 2).expect("a session");
@@ -63,10 +63,7 @@ pub(super) fn on_bench<R>(
 }
 
 /// Asks the bench on which the world's strokes lie, with the library of all effects that they could show.
-pub(super) fn on_strokes<R>(
-    (cell, world): (&Cell, &World),
-    ask: impl FnOnce(&Bench<'_, CellClips<'_, Parameters<'_>>>, &[f64]) -> R,
-) -> R {
+pub(super) fn on_strokes<R>((cell, world): (&Cell, &World), ask: impl FnOnce(&Bench<'_>, &[f64]) -> R) -> R {
     let clips = record(world, 2).expect("a session");
     let base = setting::complete(cell, None).expect("a cell");
     let library = Library::new(cell, &base, Ground::of(&clips).as_ref(), &[87.0; MAX_JOINTS]);

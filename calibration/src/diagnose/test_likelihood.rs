@@ -3,12 +3,11 @@
 use super::test_bench::{on_strokes, shipped};
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::fit::sweep::Precision;
-use inference::estimate::ClipModel as _;
-use inference::likelihood::{Evidence, Group, Likelihood as _, Reach};
+use inference::likelihood::{Group, Reach};
 use worlds::world::{Fault, Kind, World};
 
 /// The largest slope in a group of a number of the baseline, by its name [sigma for 1 % of it].
-fn slope<E: Evidence>(bench: &Bench<'_, E>, name: &str, group: Group) -> f64 {
+fn slope(bench: &Bench<'_>, name: &str, group: Group) -> f64 {
     let k = bench.library.settings.settings().iter().position(|setting| setting.name() == name);
     let k = k.expect("a number of that name");
     let (numbers, clips) = (bench.library.start(), [(0, vec![0.0; bench.scatter.count()])]);

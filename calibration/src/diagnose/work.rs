@@ -9,7 +9,6 @@ use inference::controller::ControllerError;
 use inference::engine::{Engine, EngineError};
 use inference::interrupt::Interrupt;
 use inference::kept::{self, Fingerprint, Kept, Trail};
-use inference::likelihood::Evidence;
 use inference::likelihood::arm::ArmClips;
 use inference::likelihood::cell::CellClips;
 use inference::likelihood::object::ObjectClips;
@@ -113,7 +112,7 @@ pub(super) fn cut_short() -> DiagnoseError {
 pub(super) trait Question {
     type Answer;
 
-    fn examine<E: Evidence>(&self, bench: &Bench<'_, E>) -> Result<Self::Answer, DiagnoseError>;
+    fn examine(&self, bench: &Bench<'_>) -> Result<Self::Answer, DiagnoseError>;
 }
 
 /// Asks clips of a cell with all effects that they may show.

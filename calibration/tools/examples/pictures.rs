@@ -83,7 +83,9 @@ const DRAWN: [Drawn; 5] = [
         name: "check.svg",
     },
     Drawn {
-        by: &["calibration capture control-hit-slide --cell fr3 --arm sim --clips 8 --out strokes --preview stroke.svg"],
+        by: &[
+            "calibration capture control-hit-slide --cell fr3 --arm sim --clips 8 --out strokes --preview stroke.svg",
+        ],
         file: "stroke.svg",
         shows: None,
         name: "stroke.svg",

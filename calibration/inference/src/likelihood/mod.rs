@@ -130,6 +130,4 @@ pub trait Likelihood: ClipModel {
 
 /// All that was measured, each clip with its nuisance parameters: what a diagnosis is about. Of clips that are looked at in part only
 /// [`Likelihood`] is known.
-pub trait Evidence: Likelihood<Own = WithOwn> {}
-
-impl<E: Likelihood<Own = WithOwn>> Evidence for E {}
+pub type Evidence<'a> = dyn Likelihood<Own = WithOwn> + 'a;

@@ -10,15 +10,10 @@ use super::turned::{Acts, Side, Turned};
 use crate::diagnose::fit::parameters::Spread;
 use crate::words::UNBOUNDED;
 use inference::estimate::interval::LEVEL;
-use inference::likelihood::Evidence;
 use std::collections::BTreeMap;
 
 /// The parameters of a subject that each session has of its own.
-pub(super) fn of_subject<E: Evidence>(
-    pair_bench: &PairBench<'_, E>,
-    fitted: &Fitted,
-    subject: &Subject,
-) -> BTreeMap<String, Values> {
+pub(super) fn of_subject(pair_bench: &PairBench<'_>, fitted: &Fitted, subject: &Subject) -> BTreeMap<String, Values> {
     let library = pair_bench.bench.library;
     let spread = pair_bench.on_bench(&fitted.model, |bench| Some(Spread::of(bench, &fitted.hypothesis)));
     let rough = subject.effect.is_some_and(|effect| !library.is_of_arm(effect));

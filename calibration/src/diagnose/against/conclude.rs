@@ -23,7 +23,6 @@ use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes::Sizes;
 use crate::diagnose::select::gain::SAME_WORTH_NATS;
 use crate::diagnose::work::{DiagnoseError, Options};
-use inference::likelihood::Evidence;
 use shared_mem::recording::Session;
 use std::collections::BTreeMap;
 
@@ -44,8 +43,8 @@ pub(super) struct Case<'a> {
 ///
 /// # Errors
 /// [`DiagnoseError`] when the twin has no answer on them.
-pub(super) fn conclude<E: Evidence>(
-    pair_bench: &PairBench<'_, E>,
+pub(super) fn conclude(
+    pair_bench: &PairBench<'_>,
     case: &Case<'_>,
     options: &Options,
 ) -> Result<Comparison, DiagnoseError> {
@@ -110,14 +109,14 @@ pub(super) fn conclude<E: Evidence>(
 }
 
 /// What has to be known beside the answer: of the recordings, and of gains that stopped at an end of their range.
-fn warnings<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<String> {
+fn warnings(pair_bench: &PairBench<'_>, case: &Case<'_>) -> Vec<String> {
     let fitted = &case.found.last.fitted;
     let ended = ends::of_gains(&fitted.model.library(pair_bench.bench.library), &fitted.hypothesis.full);
     case.pair.admitted.warnings.iter().cloned().chain(ended).collect()
 }
 
 /// What A's own clips leave under what was found on A.
-fn of_a<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> f64 {
+fn of_a(pair_bench: &PairBench<'_>, case: &Case<'_>) -> f64 {
     let clips: Vec<usize> =
         pair_bench.split.confirm.iter().copied().filter(|clip| !pair_bench.is_of_b(*clip)).collect();
     pair_bench.left(&case.of_a.full, &clips).map_or(0.0, |left| left.mean_square())
@@ -125,7 +124,7 @@ fn of_a<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> f64 {
 
 /// How many times as much B leaves although both share everything as A does under its own model, in a clip like most; `None`
 /// where A leaves most of it as well.
-fn deviates<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Option<f64> {
+fn deviates(pair_bench: &PairBench<'_>, case: &Case<'_>) -> Option<f64> {
     let (of_b, of_a): (Vec<usize>, Vec<usize>) =
         pair_bench.split.searched().into_iter().partition(|clip| pair_bench.is_of_b(*clip));
     let b = pair_bench.left(case.found.without.model.of(Side::B), &of_b)?;
@@ -136,7 +135,7 @@ fn deviates<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Opti
 }
 
 /// Subjects that do as well as one that changed, beside all the others that did.
-fn rivals<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<usize> {
+fn rivals(pair_bench: &PairBench<'_>, case: &Case<'_>) -> Vec<usize> {
     let found = case.found;
     let mut rivals = Vec::new();
     for step in found.steps.iter().filter(|step| step.added.is_some_and(|added| found.last.changed.contains(&added))) {
@@ -155,7 +154,7 @@ fn named(case: &Case<'_>, rivals: &[usize]) -> Vec<String> {
 }
 
 /// Effects that act in both sessions alike.
-fn shared<E: Evidence>(pair_bench: &PairBench<'_, E>, case: &Case<'_>) -> Vec<String> {
+fn shared(pair_bench: &PairBench<'_>, case: &Case<'_>) -> Vec<String> {
     let (library, model) = (pair_bench.bench.library, &case.found.last.fitted.model);
     let acts = |subject: &&Subject| {
         let rests = |k: &usize| model.of(Side::A)[*k] == library.unknowns[*k].start;
@@ -174,8 +173,8 @@ struct Judged<'a> {
 }
 
 /// What is said of everything that may have changed.
-fn candidates<E: Evidence>(
-    pair_bench: &PairBench<'_, E>,
+fn candidates(
+    pair_bench: &PairBench<'_>,
     case: &Case<'_>,
     judged: &Judged<'_>,
     before: &Residuals,

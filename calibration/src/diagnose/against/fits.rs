@@ -11,12 +11,11 @@ use crate::diagnose::judge::score::{Predicted, predict};
 use crate::diagnose::select::criteria::CHANGES;
 use crate::diagnose::select::gain::Gain;
 use inference::admit::Split;
-use inference::likelihood::Evidence;
 
 /// What all fits share.
-pub(super) struct PairBench<'a, E> {
+pub(super) struct PairBench<'a> {
     /// All clips under the whole library.
-    pub(super) bench: &'a Bench<'a, E>,
+    pub(super) bench: &'a Bench<'a>,
     /// Index of B's first clip.
     pub(super) first_of_b: usize,
     /// Which clips are for what.
@@ -39,7 +38,7 @@ impl Fit for Fitted {
     }
 }
 
-impl<E: Evidence> PairBench<'_, E> {
+impl PairBench<'_> {
     /// Fits a model from where it is, each clip's nuisance parameters from where `near` has them.
     pub(super) fn fit(&self, model: Model, weights: &[f64], near: Option<&Fitted>, effort: Effort) -> Option<Fitted> {
         let (hypothesis, predicted) = self.on_bench(&model, |bench| {
@@ -57,11 +56,7 @@ impl<E: Evidence> PairBench<'_, E> {
     }
 
     /// Asks a bench on which the numbers that a model turns are all there are.
-    pub(super) fn on_bench<R>(
-        &self,
-        model: &Model,
-        ask: impl FnOnce(&Bench<'_, TwoSessions<'_, E>>) -> Option<R>,
-    ) -> Option<R> {
+    pub(super) fn on_bench<R>(&self, model: &Model, ask: impl FnOnce(&Bench<'_>) -> Option<R>) -> Option<R> {
         let library = model.library(self.bench.library);
         let evidence = TwoSessions { evidence: self.bench.evidence, first_of_b: self.first_of_b, model };
         let name = format!("two sessions: {:?}", model.turned);

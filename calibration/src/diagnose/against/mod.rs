@@ -46,7 +46,6 @@ use fits::PairBench;
 use inference::admit::{COMMANDS_TO_CHOOSE_BY, Refused, Split, torques};
 use inference::interrupt::Interrupt;
 use inference::kept::{Fingerprint, Kept};
-use inference::likelihood::Evidence;
 use shared_mem::progress::Progress;
 use shared_mem::recording::Session;
 use shared_mem::theta::Theta;
@@ -131,7 +130,7 @@ struct Changed<'a> {
 impl Question for Changed<'_> {
     type Answer = Comparison;
 
-    fn examine<E: Evidence>(&self, bench: &Bench<'_, E>) -> Result<Comparison, DiagnoseError> {
+    fn examine(&self, bench: &Bench<'_>) -> Result<Comparison, DiagnoseError> {
         let Self { sessions, pair, options } = self;
         let (admitted, cell) = (&pair.admitted, &sessions[0].cell);
         let split = split_of(&admitted.groups, pair.first_of_b, options.seed);
@@ -158,7 +157,7 @@ impl Question for Changed<'_> {
 
 /// Whether the parameters alone leave of A so little beyond the noise that an effect has nothing to explain: as far below doubt as where
 /// sessions in which no cause is seen have none ([`crate::diagnose::criteria::NONE_IS_RIGHT`]).
-fn is_explained<E: Evidence>(bench: &Bench<'_, E>, of_a: &Split, baseline: &Hypothesis) -> bool {
+fn is_explained(bench: &Bench<'_>, of_a: &Split, baseline: &Hypothesis) -> bool {
     let Some(left) = Residuals::at(bench, baseline, &of_a.searched()) else { return false };
     SensorGap::of_groups(&left.typical(), &left.typical())
         .iter()

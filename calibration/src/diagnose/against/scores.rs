@@ -15,7 +15,6 @@ use crate::diagnose::fit::sweep::{Column, Point, Precision, Swept, sweep};
 use crate::diagnose::propose::signatures::weights;
 use inference::estimate::interval::half_width;
 use inference::estimate::quadratic::{bounded_minimum, eliminate, minimum};
-use inference::likelihood::Evidence;
 use inference::statistics::{beyond_chi_square, level};
 use nalgebra::{DMatrix, DVector};
 
@@ -53,8 +52,8 @@ type Place = [Option<usize>; 2];
 
 impl Slopes {
     /// Around a model that was fitted; `None` where the twin has no answer, or the time is over.
-    pub(super) fn around<E: Evidence>(
-        pair_bench: &PairBench<'_, E>,
+    pub(super) fn around(
+        pair_bench: &PairBench<'_>,
         model: &Model,
         fitted: &Hypothesis,
         known_weights: Option<&[f64]>,
@@ -147,7 +146,7 @@ impl Slopes {
     }
 
     /// Every subject that has not changed yet, the most promising first.
-    pub(super) fn scores<E: Evidence>(&self, bench: &Bench<'_, E>, model: &Model, subjects: &[Subject]) -> Vec<Score> {
+    pub(super) fn scores(&self, bench: &Bench<'_>, model: &Model, subjects: &[Subject]) -> Vec<Score> {
         let shared = |number: usize| model.turned.contains(&super::turned::Turned { number, acts: Acts::Everywhere });
         let changed = |subject: &Subject| subject.numbers.clone().any(|k| is_apart(model, k));
         let all = subjects.iter().enumerate().filter(|(_, subject)| !changed(subject));
@@ -219,13 +218,7 @@ impl Slopes {
     }
 
     /// Of an effect that the model has in neither.
-    fn of_new<E: Evidence>(
-        &self,
-        bench: &Bench<'_, E>,
-        model: &Model,
-        index: usize,
-        subject: &Subject,
-    ) -> Option<Score> {
+    fn of_new(&self, bench: &Bench<'_>, model: &Model, index: usize, subject: &Subject) -> Option<Score> {
         let library = bench.library;
         let candidate = subject.effect?;
         let info = &library.candidates[candidate];

@@ -11,7 +11,6 @@ use crate::diagnose::fit::stages;
 use crate::diagnose::select::criteria::CHANGES;
 use crate::diagnose::select::forward::{Selection, backward, forward};
 use crate::diagnose::select::gain::Gain;
-use inference::likelihood::Evidence;
 use inference::statistics::normal;
 use shared_mem::progress::Progress;
 
@@ -80,8 +79,8 @@ pub(super) struct Found {
 }
 
 /// What may be added to a model of both sessions.
-struct Changes<'a, E> {
-    pair_bench: &'a PairBench<'a, E>,
+struct Changes<'a> {
+    pair_bench: &'a PairBench<'a>,
     subjects: &'a [Subject],
     weights: Vec<f64>,
     /// What the slopes around A's own model say: they show a change as it is; those around a mean of both sessions show half of it
@@ -91,8 +90,8 @@ struct Changes<'a, E> {
 }
 
 /// Searches from a hypothesis that was found on A alone. `None` where the twin has no answer, or the time is over.
-pub(super) fn search<E: Evidence>(
-    pair_bench: &PairBench<'_, E>,
+pub(super) fn search(
+    pair_bench: &PairBench<'_>,
     subjects: &[Subject],
     of_a: &Hypothesis,
     bar: &Progress,
@@ -109,7 +108,7 @@ pub(super) fn search<E: Evidence>(
     Some(Found { steps: selected.steps, without, last, weights: changes.weights })
 }
 
-impl<E: Evidence> Selection for Changes<'_, E> {
+impl Selection for Changes<'_> {
     type Model = Extended;
     type Step = Step;
 
@@ -141,7 +140,7 @@ impl<E: Evidence> Selection for Changes<'_, E> {
 /// An effect that both sessions have, fitted, and what it is worth less what its parameters gain by chance [nats].
 type Shared = (Fitted, f64);
 
-impl<E: Evidence> Changes<'_, E> {
+impl Changes<'_> {
     fn fitted(&self, model: Model, near: Option<&Fitted>) -> Option<Fitted> {
         self.pair_bench.fit(model, &self.weights, near, self.pair_bench.bench.last_pass())
     }
@@ -244,7 +243,7 @@ impl Step {
 
     /// The proven trial that is worth most. Of those that are worth the same as far as clips tell, what has a mass, a length or a
     /// friction behind it explains before what needs none.
-    fn best<E: Evidence>(&self, pair_bench: &PairBench<'_, E>, subjects: &[Subject]) -> Option<&Trial> {
+    fn best(&self, pair_bench: &PairBench<'_>, subjects: &[Subject]) -> Option<&Trial> {
         let best = self.proven().max_by(|a, b| a.net().total_cmp(&b.net()))?;
         if subjects[best.subject].is_of_bodies {
             return Some(best);
@@ -256,7 +255,7 @@ impl Step {
     }
 
     /// What does as well as the change that was added, with no more parameters.
-    pub(super) fn rivals<E: Evidence>(&self, pair_bench: &PairBench<'_, E>) -> Vec<&Trial> {
+    pub(super) fn rivals(&self, pair_bench: &PairBench<'_>) -> Vec<&Trial> {
         let Some(added) = self.added.and_then(|added| self.trials.iter().find(|trial| trial.subject == added)) else {
             return Vec::new();
         };
@@ -270,9 +269,9 @@ impl Step {
 
 impl Found {
     /// Whether a rival of the change that a step added does as well in its place beside all others that were found.
-    pub(super) fn stands_in<E: Evidence>(
+    pub(super) fn stands_in(
         &self,
-        pair_bench: &PairBench<'_, E>,
+        pair_bench: &PairBench<'_>,
         subjects: &[Subject],
         step: &Step,
         rival: &Trial,

@@ -129,16 +129,16 @@ impl Model {
 }
 
 /// The clips of both sessions under the numbers that a model turns.
-pub(super) struct TwoSessions<'a, E> {
+pub(super) struct TwoSessions<'a> {
     /// The clips, those of B behind those of A.
-    pub(super) evidence: &'a E,
+    pub(super) evidence: &'a Evidence<'a>,
     /// Index of B's first clip.
     pub(super) first_of_b: usize,
     /// What is turned.
     pub(super) model: &'a Model,
 }
 
-impl<E> TwoSessions<'_, E> {
+impl TwoSessions<'_> {
     fn full(&self, clip: usize, values: &[f64]) -> Vec<f64> {
         self.model.full(side_of(clip, self.first_of_b), values)
     }
@@ -149,7 +149,7 @@ pub(super) fn side_of(clip: usize, first_of_b: usize) -> Side {
     if clip < first_of_b { Side::A } else { Side::B }
 }
 
-impl<E: Evidence> ClipModel for TwoSessions<'_, E> {
+impl ClipModel for TwoSessions<'_> {
     fn clips(&self) -> usize {
         self.evidence.clips()
     }
@@ -159,7 +159,7 @@ impl<E: Evidence> ClipModel for TwoSessions<'_, E> {
     }
 }
 
-impl<E: Evidence> Likelihood for TwoSessions<'_, E> {
+impl Likelihood for TwoSessions<'_> {
     type Own = WithOwn;
 
     fn changed(

@@ -11,7 +11,6 @@ use crate::diagnose::judge::needed::FinalModel;
 use crate::diagnose::judge::partly::{self, Partly};
 use crate::diagnose::judge::trial::{Found, Step};
 use crate::diagnose::judge::{confidence, drift, remainder};
-use inference::likelihood::Evidence;
 
 /// The verdict, and what it rests on.
 pub(super) struct Decided<'a> {
@@ -21,7 +20,7 @@ pub(super) struct Decided<'a> {
     pub(super) partly: Option<Partly>,
 }
 
-pub(super) fn decide<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Decided<'a> {
+pub(super) fn decide<'a>(case: &Case<'a>, measures: &Measures) -> Decided<'a> {
     let finding = finding(case, measures);
     let decision = finding.decide();
     let partly = if decision.kind == Kind::Unexplained {
@@ -38,7 +37,7 @@ impl Decided<'_> {
     }
 
     /// The search, as if it had ended with what is proven.
-    pub(super) fn found<'b, E>(&'b self, case: &'b Case<'_, E>) -> &'b Found {
+    pub(super) fn found<'b>(&'b self, case: &'b Case<'_>) -> &'b Found {
         self.partly.as_ref().map_or(case.found, |partly| &partly.found)
     }
 
@@ -59,7 +58,7 @@ impl Decided<'_> {
     }
 }
 
-fn finding<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Finding<'a> {
+fn finding<'a>(case: &Case<'a>, measures: &Measures) -> Finding<'a> {
     let Case { bench, found, .. } = *case;
     let mut rivals = Vec::new();
     let mut clear = true;
@@ -86,7 +85,7 @@ fn finding<'a, E: Evidence>(case: &Case<'a, E>, measures: &Measures) -> Finding<
 }
 
 /// Of how many effects the clips would show anything, by their signatures around the baseline.
-fn power<E: Evidence>(case: &Case<'_, E>) -> Power {
+fn power(case: &Case<'_>) -> Power {
     let trials = &case.first().trials;
     let blind = trials.iter().filter(|trial| trial.scored.signal < TESTABLE);
     // A signal grows with the size.
@@ -107,7 +106,7 @@ pub(super) fn sureness(found: &Found) -> f64 {
 
 /// Whether a rival of an effect does as well in its place beside all the others that were found: where several act, what one
 /// of them left unexplained makes rivals of it look alike that are separated once the others are there.
-fn stands_in<E: Evidence>(case: &Case<'_, E>, step: &Step, effect: usize, rival: usize) -> bool {
+fn stands_in(case: &Case<'_>, step: &Step, effect: usize, rival: usize) -> bool {
     let Case { bench, split, found, .. } = *case;
     let (last, weights) = (&found.last, &found.steps[found.steps.len() - 1].weights);
     let fitted = step.trial(rival).and_then(|trial| trial.fitted.as_ref());

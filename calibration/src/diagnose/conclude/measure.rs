@@ -9,7 +9,6 @@ use crate::diagnose::judge::localise::localise;
 use crate::diagnose::judge::remainder::Left;
 use crate::diagnose::judge::sizes;
 use crate::diagnose::work::DiagnoseError;
-use inference::likelihood::Evidence;
 
 /// What an answer is measured by.
 pub(super) struct Measures {
@@ -29,7 +28,7 @@ pub(super) struct Measures {
 }
 
 /// Measures both.
-pub(super) fn measure<E: Evidence>(case: &Case<'_, E>) -> Result<Measures, DiagnoseError> {
+pub(super) fn measure(case: &Case<'_>) -> Result<Measures, DiagnoseError> {
     let Case { bench, split, found, session, admitted, options } = *case;
     let weights = &case.first().weights[..];
     let without = Measured::of(bench, split, &case.first().from, weights)?;

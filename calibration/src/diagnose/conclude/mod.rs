@@ -35,12 +35,11 @@ use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
 use crate::diagnose::judge::trial::{Found, Step};
 use inference::admit::{Admitted, Split};
-use inference::likelihood::Evidence;
 use shared_mem::recording::Session;
 
 /// A search that came to its end, and all that its answer is drawn from.
-pub struct Case<'a, E> {
-    pub bench: &'a Bench<'a, E>,
+pub struct Case<'a> {
+    pub bench: &'a Bench<'a>,
     pub split: &'a Split,
     pub found: &'a Found,
     pub session: &'a Session,
@@ -48,7 +47,7 @@ pub struct Case<'a, E> {
     pub options: &'a Options,
 }
 
-impl<E: Evidence> Case<'_, E> {
+impl Case<'_> {
     /// The step that the search began with: it extends the baseline.
     fn first(&self) -> &Step {
         &self.found.steps[0]
@@ -73,7 +72,7 @@ impl<E: Evidence> Case<'_, E> {
 ///
 /// # Errors
 /// [`DiagnoseError`] when the twin has no answer on them.
-pub fn conclude<E: Evidence>(case: &Case<'_, E>) -> Result<Diagnosis, DiagnoseError> {
+pub fn conclude(case: &Case<'_>) -> Result<Diagnosis, DiagnoseError> {
     let measures = measure::measure(case)?;
     let decided = decide::decide(case, &measures);
     say::say(case, measures, &decided)

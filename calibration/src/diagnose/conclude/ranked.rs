@@ -14,18 +14,12 @@ use crate::diagnose::judge::gap::{Residuals, SHRINK_OF_A_DOUBLED_GAP};
 use crate::diagnose::judge::held_out::estimated;
 use crate::diagnose::judge::trial::{Found, Step, Trial};
 use crate::diagnose::propose::screening;
-use inference::likelihood::Evidence;
 
 /// Of numbers with which the twin has no answer in clips that they were not fitted to.
 const NO_ANSWER: Share = Share { value: SHRINK_OF_A_DOUBLED_GAP, ci90: [SHRINK_OF_A_DOUBLED_GAP; 2] };
 
 /// What is said of every candidate: what was named first, then what is possible, then the likelier.
-pub(super) fn candidates<E: Evidence>(
-    case: &Case<'_, E>,
-    measures: &Measures,
-    decided: &Decided<'_>,
-    kind: Kind,
-) -> Vec<Candidate> {
+pub(super) fn candidates(case: &Case<'_>, measures: &Measures, decided: &Decided<'_>, kind: Kind) -> Vec<Candidate> {
     let Case { bench, split, .. } = *case;
     let (found, before) = (decided.found(case), &measures.without.held_out.left);
     let first = &found.steps[0];
@@ -56,8 +50,8 @@ pub(super) fn candidates<E: Evidence>(
 }
 
 /// What is said of a candidate is drawn from this.
-struct DrawnFrom<'a, E> {
-    case: &'a Case<'a, E>,
+struct DrawnFrom<'a> {
+    case: &'a Case<'a>,
     measures: &'a Measures,
     decided: &'a Decided<'a>,
     kind: Kind,
@@ -71,7 +65,7 @@ struct DrawnFrom<'a, E> {
     left: Vec<Option<Residuals>>,
 }
 
-impl<E: Evidence> DrawnFrom<'_, E> {
+impl DrawnFrom<'_> {
     /// `trial`: that of the first step.
     fn said_of(&self, trial: &Trial) -> Candidate {
         let Self { case, measures, found, kind, .. } = *self;
@@ -127,7 +121,7 @@ fn after_keeping(found: &Found, left: &[Option<Residuals>], after: &Residuals, p
 
 /// Whether an effect on the object was not fitted because the arm's gap was open: where the arm is elsewhere, what it hits
 /// says nothing of the object.
-fn is_hidden_by_the_arm<E: Evidence>(bench: &Bench<'_, E>, step: &Step, trial: &Trial) -> bool {
+fn is_hidden_by_the_arm(bench: &Bench<'_>, step: &Step, trial: &Trial) -> bool {
     let effect = trial.scored.candidate;
     let felt = bench.library.candidates[effect].is_of_arm() || bench.library.arm_may_feel(effect);
     trial.fitted.is_none() && !felt && screening::arm_gap_is_open(&step.whole, &step.left)
@@ -149,7 +143,7 @@ fn judged_in(found: &Found, effect: usize, believed: bool) -> usize {
         .unwrap_or(0)
 }
 
-fn confusable<E: Evidence>(case: &Case<'_, E>, first: &Step, effect: usize, overdispersion: f64) -> Vec<String> {
+fn confusable(case: &Case<'_>, first: &Step, effect: usize, overdispersion: f64) -> Vec<String> {
     let near = confidence::rivals(first, case.bench.library, effect, overdispersion);
     near.iter().map(|other| case.name(*other).to_owned()).collect()
 }

@@ -8,7 +8,6 @@ use crate::diagnose::judge::trial::{Found, LARGE_SHARE_CLOSED, MIN_NATS_PER_ROW,
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::gain::Gain;
 use crate::words::words;
-use inference::likelihood::Evidence;
 
 /// A candidate with all that its reason is drawn from.
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +29,7 @@ pub(super) struct Judged<'a> {
     pub(super) finding: &'a Finding<'a>,
 }
 
-pub(super) fn reason<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>) -> String {
+pub(super) fn reason(bench: &Bench<'_>, found: &Found, judged: &Judged<'_>) -> String {
     let scored = &judged.trial.scored;
     let text = match (judged.status, &judged.trial.fitted) {
         (Status::NotTestable, _) if judged.hidden => {
@@ -60,7 +59,7 @@ pub(super) fn reason<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &
 }
 
 /// Against a candidate that was fitted.
-fn against<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>, advantage: &Gain) -> String {
+fn against(bench: &Bench<'_>, found: &Found, judged: &Judged<'_>, advantage: &Gain) -> String {
     let Judged { trial, finding, .. } = judged;
     let (effect, cost) = (trial.scored.candidate, trial.scored.cost);
     let name = bench.library.candidates[effect].effect.name;
@@ -140,11 +139,7 @@ fn nearest(judged: &Judged<'_>) -> String {
 }
 
 /// The effect that was kept in the step of a candidate, or the best of it where none was.
-fn leader<'a, E: Evidence>(
-    bench: &Bench<'_, E>,
-    found: &'a Found,
-    judged: &Judged<'_>,
-) -> Option<(&'a Trial, &'a Gain)> {
+fn leader<'a>(bench: &Bench<'_>, found: &'a Found, judged: &Judged<'_>) -> Option<(&'a Trial, &'a Gain)> {
     let step = &found.steps[judged.place];
     let kept = found.kept().find(|(place, _)| *place == judged.place).map(|(_, effect)| effect);
     let trial = kept.and_then(|effect| step.trial(effect)).or_else(|| step.best(bench).map(|(trial, ..)| trial))?;
@@ -153,7 +148,7 @@ fn leader<'a, E: Evidence>(
 }
 
 /// Against a candidate whose signature ruled it out before a fit.
-fn screened<E: Evidence>(bench: &Bench<'_, E>, found: &Found, judged: &Judged<'_>) -> String {
+fn screened(bench: &Bench<'_>, found: &Found, judged: &Judged<'_>) -> String {
     let scored = &judged.trial.scored;
     let share = 100.0 * scored.cosine.powi(2);
     if scored.p >= BY_CHANCE {

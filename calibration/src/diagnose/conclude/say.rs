@@ -56,11 +56,7 @@ fn about(session: &Session, options: &Options, site: &Site, verdict: Verdict, ne
 }
 
 /// Says what was measured and decided.
-pub(super) fn say<E: Evidence>(
-    case: &Case<'_, E>,
-    measures: Measures,
-    decided: &Decided<'_>,
-) -> Result<Diagnosis, DiagnoseError> {
+pub(super) fn say(case: &Case<'_>, measures: Measures, decided: &Decided<'_>) -> Result<Diagnosis, DiagnoseError> {
     let Case { bench, session, admitted, options, .. } = *case;
     let (without, with, shown) = (&measures.without, decided.with(&measures), decided.shown(&measures));
     let (before, after) = (&without.held_out.left, &with.held_out.left);
@@ -97,8 +93,8 @@ pub(super) fn say<E: Evidence>(
 }
 
 /// The verdict in its sentence, and where what was found leaves most.
-fn verdict_of<E: Evidence>(
-    case: &Case<'_, E>,
+fn verdict_of(
+    case: &Case<'_>,
     measures: &Measures,
     decided: &Decided<'_>,
     sizes: &Sizes,
@@ -131,11 +127,7 @@ fn verdict_of<E: Evidence>(
 }
 
 /// An effect that is likely and not proven, and how far the gap shrinks with it; `None` where it widens: that is no lead.
-fn not_proven<'a, E: Evidence>(
-    case: &'a Case<'_, E>,
-    decided: &'a Decided<'_>,
-    before: &Residuals,
-) -> Option<(Unproven<'a>, f64)> {
+fn not_proven<'a>(case: &'a Case<'_>, decided: &'a Decided<'_>, before: &Residuals) -> Option<(Unproven<'a>, f64)> {
     let open = unproven(case.bench, decided.found(case), case.admitted.cut())?;
     // As of every candidate that is not named.
     let share = estimated(case.bench, case.split, open.fit)?.shrink(before, case.options.seed).value;
@@ -154,7 +146,7 @@ fn clips(admitted: &Admitted, split: &Split) -> Clips {
 }
 
 /// What has to be known beside the answer: of the recording, of few commands, of effects as strong as they are looked for.
-fn warnings<E: Evidence>(case: &Case<'_, E>, shown: &Hypothesis) -> Vec<String> {
+fn warnings(case: &Case<'_>, shown: &Hypothesis) -> Vec<String> {
     let Hypothesis { full, effects, .. } = shown;
     let ended = effects.iter().filter(|effect| !ends::stopped(case.bench.library, **effect, full).is_empty());
     let sentence = |effect: &usize| {
@@ -188,7 +180,7 @@ fn few(admitted: &Admitted, split: &Split) -> Option<String> {
 }
 
 /// The verdict where what was found is proven, but a part of the gap stays: so much of the joints [rad] and the object [m].
-fn in_part<E: Evidence>(case: &Case<'_, E>, partly: &Partly, facts: &Facts, stays: &str, sizes: &Sizes) -> Verdict {
+fn in_part(case: &Case<'_>, partly: &Partly, facts: &Facts, stays: &str, sizes: &Sizes) -> Verdict {
     let looks_like = partly.looks_like(case.bench);
     let [own, rivals] = partly.effects(case.bench);
     let text = headline::in_part(facts, &partly.share, partly.unusual, stays, looks_like, &rivals);
@@ -229,7 +221,7 @@ fn next(verdict: &Verdict, decided: &Decided<'_>, largest: Option<&Place>, site:
 }
 
 /// Residuals of the channels with the largest gap, before and after, on the confirm clips.
-fn traces(evidence: &impl Evidence, [before, after]: [&Residuals; 2], admitted: &Admitted) -> Vec<Trace> {
+fn traces(evidence: &Evidence<'_>, [before, after]: [&Residuals; 2], admitted: &Admitted) -> Vec<Trace> {
     let mut sized: Vec<(f64, usize, usize)> = Vec::new();
     for (place, (clip, residuals)) in before.clips.iter().enumerate() {
         for channel in 0..evidence.channels().len() {

@@ -19,8 +19,8 @@ use inference::likelihood::{Channel, Evidence, Group, Likelihood, Near, Reach, R
 use std::sync::Arc;
 
 /// Clips around a point where another program simulates strokes; elsewhere the clips as they are.
-pub(in crate::diagnose) struct Anchored<'a, E> {
-    whole: &'a E,
+pub(in crate::diagnose) struct Anchored<'a> {
+    whole: &'a Evidence<'a>,
     around: Option<Around>,
 }
 
@@ -34,19 +34,19 @@ struct Around {
     label: String,
 }
 
-impl<'a, E: Evidence> Anchored<'a, E> {
-    pub(in crate::diagnose) fn new(whole: &'a E, point: &[f64]) -> Self {
+impl<'a> Anchored<'a> {
+    pub(in crate::diagnose) fn new(whole: &'a Evidence<'a>, point: &[f64]) -> Self {
         Self { whole, around: whole.engine().map(|_| Around::new(whole, point)) }
     }
 
     /// A bench for these.
-    pub(in crate::diagnose) fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
+    pub(in crate::diagnose) fn bench<'b>(&'b self, whole: &Bench<'b>) -> Bench<'b> {
         whole.seen_as(self, self.around.as_ref().map_or(whole.trail.1, |around| &around.label))
     }
 }
 
 impl Around {
-    fn new(whole: &impl Evidence, point: &[f64]) -> Self {
+    fn new(whole: &Evidence<'_>, point: &[f64]) -> Self {
         Self {
             point: point.to_vec(),
             nothing: vec![0.0; whole.scatter().count()],
@@ -55,7 +55,7 @@ impl Around {
         }
     }
 
-    fn there(&self, whole: &impl Evidence, clip: usize) -> Result<Arc<Vec<f64>>, Impossible> {
+    fn there(&self, whole: &Evidence<'_>, clip: usize) -> Result<Arc<Vec<f64>>, Impossible> {
         self.there[clip].at(self.point.clone(), || {
             let mut residuals = Vec::new();
             whole.residuals(clip, &self.point, &self.nothing, &mut residuals)?;
@@ -68,7 +68,7 @@ impl Around {
     }
 }
 
-impl<E: Evidence> ClipModel for Anchored<'_, E> {
+impl ClipModel for Anchored<'_> {
     fn clips(&self) -> usize {
         self.whole.clips()
     }
@@ -80,7 +80,7 @@ impl<E: Evidence> ClipModel for Anchored<'_, E> {
     }
 }
 
-impl<E: Evidence> Likelihood for Anchored<'_, E> {
+impl Likelihood for Anchored<'_> {
     type Own = WithOwn;
 
     fn changed(

@@ -8,15 +8,15 @@ use crate::diagnose::library::Library;
 use inference::interrupt::Interrupt;
 use inference::kept::{Fingerprint, Trail};
 use inference::likelihood::Likelihood;
-use inference::likelihood::random_effects::{RandomEffects, WithOwn};
+use inference::likelihood::random_effects::{OwnNumbers, RandomEffects, WithOwn};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 use twin::effects::{EffectInfo, Parameter, Place, Role};
 
 /// What every step of the diagnosis is given.
-pub struct Bench<'a, E> {
-    pub evidence: &'a E,
+pub struct Bench<'a, O: OwnNumbers = WithOwn> {
+    pub evidence: &'a dyn Likelihood<Own = O>,
     pub library: &'a Library,
     /// What varies from clip to clip.
     pub scatter: RandomEffects,
@@ -26,13 +26,18 @@ pub struct Bench<'a, E> {
     pub trail: Trail<'a>,
 }
 
-impl<'a, E: Likelihood> Bench<'a, E> {
-    pub fn new(evidence: &'a E, library: &'a Library, interrupt: &'a Interrupt, trail: Trail<'a>) -> Self {
+impl<'a, O: OwnNumbers> Bench<'a, O> {
+    pub fn new(
+        evidence: &'a dyn Likelihood<Own = O>,
+        library: &'a Library,
+        interrupt: &'a Interrupt,
+        trail: Trail<'a>,
+    ) -> Self {
         Self { evidence, library, scatter: evidence.scatter(), interrupt, trail }
     }
 
     /// A bench of the same clips seen otherwise; `label` separates its kept work from this one's.
-    pub fn seen_as<'b, F: Likelihood>(&self, evidence: &'b F, label: &'b str) -> Bench<'b, F>
+    pub fn seen_as<'b, P: OwnNumbers>(&self, evidence: &'b dyn Likelihood<Own = P>, label: &'b str) -> Bench<'b, P>
     where
         'a: 'b,
     {
@@ -136,7 +141,7 @@ fn least(effect: &EffectInfo) -> f64 {
     }
 }
 
-impl<E: Likelihood> Bench<'_, E> {
+impl<O: OwnNumbers> Bench<'_, O> {
     /// Numbers that are free when these effects act.
     pub fn free(&self, effects: &[usize]) -> Vec<usize> {
         let of_effects = effects.iter().flat_map(|effect| self.library.candidates[*effect].turned.clone());
@@ -162,9 +167,9 @@ impl<E: Likelihood> Bench<'_, E> {
         full: Vec<f64>,
         clips: &[usize],
         weights: &[f64],
-        near: Option<&Hypothesis<E::Own>>,
+        near: Option<&Hypothesis<O>>,
         effort: Effort,
-    ) -> Option<Hypothesis<E::Own>> {
+    ) -> Option<Hypothesis<O>> {
         let from = self.with_own(clips, near);
         let step = self.step("fit").with(&(effects, clips, effort)).with_numbers(&full).with_numbers(weights);
         let step = step.with_numbers(from.iter().flat_map(|(_, own)| own));
@@ -172,7 +177,7 @@ impl<E: Likelihood> Bench<'_, E> {
     }
 
     /// Clips with their nuisance parameters as a hypothesis has them, else at rest.
-    pub(in crate::diagnose) fn with_own(&self, clips: &[usize], near: Option<&Hypothesis<E::Own>>) -> Clips {
+    pub(in crate::diagnose) fn with_own(&self, clips: &[usize], near: Option<&Hypothesis<O>>) -> Clips {
         let count = self.scatter.count();
         let own = |clip: usize| near.map_or_else(|| vec![0.0; count], |near| near.own(clip, count));
         clips.iter().map(|clip| (*clip, own(*clip))).collect()
@@ -190,7 +195,7 @@ impl<E: Likelihood> Bench<'_, E> {
         from: Clips,
         weights: &[f64],
         effort: Effort,
-    ) -> Option<Hypothesis<E::Own>> {
+    ) -> Option<Hypothesis<O>> {
         let free = if effort.frees_held { self.all_free(effects) } else { self.free(effects) };
         let holds = |k: &usize| effort.holds_joints && self.library.joints[*k].is_some();
         let moving: Vec<usize> = free.iter().copied().filter(|k| !holds(k)).collect();
@@ -261,22 +266,12 @@ impl<E: Likelihood> Bench<'_, E> {
     }
 
     /// Clips that were not fitted, at a hypothesis' numbers with their nuisance parameters at their best.
-    pub fn judge(
-        &self,
-        hypothesis: &Hypothesis<E::Own>,
-        clips: &[usize],
-        weights: &[f64],
-    ) -> Option<Vec<FittedClip<E::Own>>> {
+    pub fn judge(&self, hypothesis: &Hypothesis<O>, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip<O>>> {
         let step = self.step("judge").with(&clips).with_numbers(&hypothesis.full).with_numbers(weights);
         self.trail.0.once(&step, || self.judged(hypothesis, clips, weights))
     }
 
-    fn judged(
-        &self,
-        hypothesis: &Hypothesis<E::Own>,
-        clips: &[usize],
-        weights: &[f64],
-    ) -> Option<Vec<FittedClip<E::Own>>> {
+    fn judged(&self, hypothesis: &Hypothesis<O>, clips: &[usize], weights: &[f64]) -> Option<Vec<FittedClip<O>>> {
         let at = self.profiled(&hypothesis.full, self.with_own(clips, None), weights)?;
         let at = self.restarted(&hypothesis.full, at, weights);
         let swept = self.linearise(&hypothesis.full, &[], &at, Precision::Exact)?;
@@ -308,7 +303,7 @@ impl<E: Likelihood> Bench<'_, E> {
     }
 
     /// Whether an effect of a hypothesis is every engine's own: what any two of them differ by.
-    pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis<E::Own>) -> bool {
+    pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis<O>) -> bool {
         self.is_a_period_more(effect, hypothesis) || self.is_of_engines(effect, &hypothesis.full)
     }
 
@@ -324,7 +319,7 @@ impl<E: Likelihood> Bench<'_, E> {
 
     /// Whether an effect does no more to commands that another changes already than shift them by a control period: from which
     /// period on a filtered command acts differs.
-    fn is_a_period_more(&self, effect: usize, hypothesis: &Hypothesis<E::Own>) -> bool {
+    fn is_a_period_more(&self, effect: usize, hypothesis: &Hypothesis<O>) -> bool {
         let of_commands = |k: &usize| self.library.candidates[*k].effect.acts_on == Place::CommandPath;
         let weak = |size: &usize| hypothesis.full[*size] - self.library.unknowns[*size].start < DELAY_OF_CONVENTION;
         of_commands(&effect)
@@ -333,7 +328,7 @@ impl<E: Likelihood> Bench<'_, E> {
     }
 
     /// The sum of fitted clips' forms, numbers held to their known ranges.
-    pub fn held(&self, hypothesis: &Hypothesis<E::Own>) -> DMatrix<f64> {
+    pub fn held(&self, hypothesis: &Hypothesis<O>) -> DMatrix<f64> {
         let size = 1 + hypothesis.free.len();
         let mut sum = hypothesis.fitted.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.reduced.form);
         let columns: Vec<_> = hypothesis.free.iter().map(|k| super::sweep::Column::Number(*k)).collect();

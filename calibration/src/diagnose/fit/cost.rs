@@ -1,10 +1,10 @@
 //! What clips cost at numbers: squared weighted residuals, and the clips' nuisance parameters in their sigmas.
 
 use super::bench::Bench;
-use inference::likelihood::Likelihood;
+use inference::likelihood::random_effects::OwnNumbers;
 use rayon::prelude::*;
 
-impl<E: Likelihood> Bench<'_, E> {
+impl<O: OwnNumbers> Bench<'_, O> {
     /// Sum of squared weighted residuals and of the nuisance parameters in their sigmas.
     pub(in crate::diagnose) fn cost(&self, full: &[f64], clips: &[(usize, Vec<f64>)], weights: &[f64]) -> Option<f64> {
         Some(self.costs(full, clips, weights)?.iter().sum::<f64>()).filter(|cost| cost.is_finite())

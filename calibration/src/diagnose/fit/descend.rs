@@ -10,7 +10,7 @@ use super::floor;
 use super::sweep::{Precision, Swept, SweptClip};
 use inference::estimate::Impossible;
 use inference::estimate::solve::{Descent, Problem, Quadratic, Schedule, Trial, descend};
-use inference::likelihood::Likelihood;
+use inference::likelihood::random_effects::OwnNumbers;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -20,14 +20,14 @@ const SCHEDULE: Schedule =
     Schedule { damping: 1e-4, grown: 1e-3, trials: 6, iterations: 0, tolerance: 0.05, secant: Some(0.5) };
 
 /// A hypothesis of which some numbers move.
-struct Moving<'a, E> {
-    bench: &'a Bench<'a, E>,
+struct Moving<'a, O: OwnNumbers> {
+    bench: &'a Bench<'a, O>,
     moving: &'a [usize],
     weights: &'a [f64],
     precision: Precision,
 }
 
-impl<E: Likelihood> Bench<'_, E> {
+impl<O: OwnNumbers> Bench<'_, O> {
     /// At most so many damped steps of some numbers and of the clips' nuisance parameters; the last linearisation too, where no step
     /// from it was worth it. `None` when the twin has no answer at the start.
     pub(super) fn descended(
@@ -63,7 +63,7 @@ fn no_answer() -> Impossible {
     Impossible("the twin has no answer at these parameters".into())
 }
 
-impl<E: Likelihood> Problem for Moving<'_, E> {
+impl<O: OwnNumbers> Problem for Moving<'_, O> {
     type Place = Reached;
     type Slopes = Swept;
 
@@ -140,7 +140,7 @@ mod tests {
     use inference::estimate::ClipModel;
     use inference::interrupt::Interrupt;
     use inference::likelihood::random_effects::{RandomEffects, WithOwn};
-    use inference::likelihood::{Channel, Group, Row, StageName, setting};
+    use inference::likelihood::{Channel, Group, Likelihood, Row, StageName, setting};
     use shared_mem::msg::MAX_JOINTS;
     use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -10,24 +10,25 @@ use crate::diagnose::library::Library;
 use inference::estimate::Impossible;
 use inference::estimate::quadratic::minimum;
 use inference::likelihood::arm::noise::correlation_length;
+use inference::likelihood::random_effects::OwnNumbers;
 use inference::likelihood::{Channel, Group, Likelihood};
 use inference::statistics::median;
 use nalgebra::DVector;
 
 /// Factors while nothing is known of how far the twin is off: the sensors' noise alone. The joints in contact are left out: any
 /// engine is off there by many times their noise.
-pub fn sensors_alone(evidence: &impl Likelihood) -> Vec<f64> {
+pub fn sensors_alone<O: OwnNumbers>(evidence: &dyn Likelihood<Own = O>) -> Vec<f64> {
     let known = |channel: &Channel| if channel.group == Group::Contact { 0.0 } else { 1.0 };
     evidence.channels().iter().map(known).collect()
 }
 
 /// Factor on each channel of residuals given clip by clip, one list of values a row.
-pub fn weights(evidence: &impl Likelihood, clips: &[(usize, Vec<f64>)]) -> Vec<f64> {
+pub fn weights<O: OwnNumbers>(evidence: &dyn Likelihood<Own = O>, clips: &[(usize, Vec<f64>)]) -> Vec<f64> {
     let channels = evidence.channels().len();
     (0..channels).map(|channel| weight(evidence, clips, channel)).collect()
 }
 
-fn weight(evidence: &impl Likelihood, clips: &[(usize, Vec<f64>)], channel: usize) -> f64 {
+fn weight<O: OwnNumbers>(evidence: &dyn Likelihood<Own = O>, clips: &[(usize, Vec<f64>)], channel: usize) -> f64 {
     let of_clip = |(clip, residuals): &(usize, Vec<f64>)| {
         let of_channel: Vec<f64> = (evidence.rows(*clip).iter().zip(residuals))
             .filter(|(row, _)| row.channel == channel)
@@ -64,9 +65,9 @@ pub fn overdispersion(taken: &[f64], found: &[f64]) -> f64 {
 ///
 /// # Errors
 /// As of [`Swept::reduced`].
-pub fn richest_residuals(
+pub fn richest_residuals<O: OwnNumbers>(
     swept: &Swept,
-    evidence: &impl Likelihood,
+    evidence: &dyn Likelihood<Own = O>,
     library: &Library,
     weights: &[f64],
 ) -> Result<Vec<(usize, Vec<f64>)>, Impossible> {
@@ -94,9 +95,9 @@ pub fn richest_residuals(
 ///
 /// # Errors
 /// As of [`Swept::own_after`].
-pub fn residuals_at(
+pub fn residuals_at<O: OwnNumbers>(
     swept: &Swept,
-    evidence: &impl Likelihood,
+    evidence: &dyn Likelihood<Own = O>,
     weights: &[f64],
     free: &[usize],
     at: &[f64],

@@ -3,15 +3,10 @@
 
 use super::bench::{Bench, Hypothesis};
 use inference::estimate::quadratic::minimum;
-use inference::likelihood::Evidence;
 use nalgebra::DMatrix;
 
 /// How far the free numbers move to the minimum of a form over (residual, free numbers), within their bounds.
-pub(in crate::diagnose) fn shift_to<E: Evidence>(
-    bench: &Bench<'_, E>,
-    hypothesis: &Hypothesis,
-    form: &DMatrix<f64>,
-) -> Vec<f64> {
+pub(in crate::diagnose) fn shift_to(bench: &Bench<'_>, hypothesis: &Hypothesis, form: &DMatrix<f64>) -> Vec<f64> {
     let all: Vec<usize> = (1..=hypothesis.free.len()).collect();
     let within = |(index, shift): (&usize, &f64)| {
         let (value, unknown) = (hypothesis.full[*index], &bench.library.unknowns[*index]);
@@ -21,11 +16,7 @@ pub(in crate::diagnose) fn shift_to<E: Evidence>(
 }
 
 /// All numbers without the clips `out`.
-pub(in crate::diagnose) fn numbers_without<E: Evidence>(
-    bench: &Bench<'_, E>,
-    hypothesis: &Hypothesis,
-    out: &[usize],
-) -> Vec<f64> {
+pub(in crate::diagnose) fn numbers_without(bench: &Bench<'_>, hypothesis: &Hypothesis, out: &[usize]) -> Vec<f64> {
     let left_out = hypothesis.fitted.iter().filter(|clip| out.contains(&clip.clip));
     let rest = left_out.fold(bench.held(hypothesis), |sum, clip| sum - &clip.reduced.form);
     let mut full = hypothesis.full.clone();

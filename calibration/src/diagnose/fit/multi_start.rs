@@ -3,7 +3,7 @@
 
 use super::bench::{Bench, Hypothesis, Reached};
 use super::effort::{Effort, PROBE};
-use inference::likelihood::Likelihood;
+use inference::likelihood::random_effects::{OwnNumbers, WithOwn};
 
 /// What was fitted or tried, with its cost.
 pub trait Fit {
@@ -36,23 +36,23 @@ pub fn cheapest<F: Fit>(fits: impl IntoIterator<Item = F>) -> Option<F> {
 }
 
 /// Effects that are fitted together to the same clips, from wherever.
-pub struct MultiStart<'a, E: Likelihood> {
-    pub bench: &'a Bench<'a, E>,
+pub struct MultiStart<'a, O: OwnNumbers = WithOwn> {
+    pub bench: &'a Bench<'a, O>,
     pub effects: &'a [usize],
     pub clips: &'a [usize],
     pub weights: &'a [f64],
     /// Where each clip's nuisance parameters begin.
-    pub near: Option<&'a Hypothesis<E::Own>>,
+    pub near: Option<&'a Hypothesis<O>>,
 }
 
-impl<E: Likelihood> MultiStart<'_, E> {
+impl<O: OwnNumbers> MultiStart<'_, O> {
     /// From one start.
-    pub fn fit(&self, full: Vec<f64>, effort: Effort) -> Option<Hypothesis<E::Own>> {
+    pub fn fit(&self, full: Vec<f64>, effort: Effort) -> Option<Hypothesis<O>> {
         self.bench.fit(self.effects, full, self.clips, self.weights, self.near, effort)
     }
 
     /// The cheapest of fits from several starts.
-    pub fn best(&self, starts: impl IntoIterator<Item = Vec<f64>>, effort: Effort) -> Option<Hypothesis<E::Own>> {
+    pub fn best(&self, starts: impl IntoIterator<Item = Vec<f64>>, effort: Effort) -> Option<Hypothesis<O>> {
         cheapest(starts.into_iter().filter_map(|full| self.fit(full, effort)))
     }
 
@@ -63,20 +63,20 @@ impl<E: Likelihood> MultiStart<'_, E> {
         effort: Effort,
         count: usize,
         further: Effort,
-    ) -> Option<Hypothesis<E::Own>> {
+    ) -> Option<Hypothesis<O>> {
         let mut begun: Vec<_> = starts.into_iter().filter_map(|full| self.fit(full, effort)).collect();
         begun.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
-        let onwards = |fit: &Hypothesis<E::Own>| MultiStart { near: Some(fit), ..*self }.fit(fit.full.clone(), further);
+        let onwards = |fit: &Hypothesis<O>| MultiStart { near: Some(fit), ..*self }.fit(fit.full.clone(), further);
         cheapest(begun.iter().take(count).filter_map(onwards))
     }
 }
 
-impl<E: Likelihood> Bench<'_, E> {
+impl<O: OwnNumbers> Bench<'_, O> {
     /// What the clips of a hypothesis cost at `full` after one step of some numbers alone, and the numbers then. `None` when the
     /// twin has no answer there.
     pub(in crate::diagnose) fn after_a_step(
         &self,
-        from: &Hypothesis<E::Own>,
+        from: &Hypothesis<O>,
         full: Vec<f64>,
         moving: &[usize],
         weights: &[f64],

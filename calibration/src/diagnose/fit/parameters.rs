@@ -9,8 +9,8 @@ use super::bench::{Bench, Hypothesis};
 use crate::answer::Size;
 use crate::words::UNBOUNDED;
 use inference::estimate::interval::Jackknife;
+use inference::likelihood::random_effects::OwnNumbers;
 use inference::likelihood::setting::Setting;
-use inference::likelihood::{Evidence, Likelihood};
 use inference::statistics::normal;
 use std::collections::BTreeMap;
 use twin::effects::{Role, Shape};
@@ -19,13 +19,13 @@ use twin::effects::{Role, Shape};
 const LEVEL: f64 = 0.90;
 
 /// The parameters of one of a hypothesis' effects.
-pub fn of_effect<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {
+pub fn of_effect(bench: &Bench<'_>, hypothesis: &Hypothesis, effect: usize) -> BTreeMap<String, Size> {
     of_effect_moved(bench, hypothesis, effect, &[])
 }
 
 /// The same; `time_step`: how far the twin's time step moves each free number, where that is known ([`super::time_step`]).
-pub fn of_effect_moved<E: Evidence>(
-    bench: &Bench<'_, E>,
+pub fn of_effect_moved(
+    bench: &Bench<'_>,
     hypothesis: &Hypothesis,
     effect: usize,
     time_step: &[f64],
@@ -80,7 +80,7 @@ fn readable(value: f64, [low, high]: [f64; 2], inverse: bool, possible: [f64; 2]
 pub(in crate::diagnose) struct Spread(Jackknife);
 
 impl Spread {
-    pub(in crate::diagnose) fn of<E: Likelihood>(bench: &Bench<'_, E>, hypothesis: &Hypothesis<E::Own>) -> Self {
+    pub(in crate::diagnose) fn of<O: OwnNumbers>(bench: &Bench<'_, O>, hypothesis: &Hypothesis<O>) -> Self {
         let clips = hypothesis.fitted.iter().map(|clip| &clip.reduced.form);
         Self(Jackknife::new(&bench.held(hypothesis), clips))
     }

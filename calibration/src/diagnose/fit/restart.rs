@@ -8,7 +8,7 @@ use super::bench::{Bench, Clips};
 use super::effort::ANOTHER_WAY_DEVIANCE;
 use super::multi_start::{Tried, cheapest};
 use super::sweep::Precision;
-use inference::likelihood::Likelihood;
+use inference::likelihood::random_effects::OwnNumbers;
 use inference::statistics::median;
 use nalgebra::DVector;
 
@@ -20,7 +20,7 @@ const OUTLIER_DISTANCE: f64 = 4.0;
 const RESTART_SIGMAS: [f64; 4] = [-5.0, -2.5, 2.5, 5.0];
 const KEPT_SHARES: [f64; 2] = [0.5, 1.0];
 
-impl<E: Likelihood> Bench<'_, E> {
+impl<O: OwnNumbers> Bench<'_, O> {
     /// Clips with their nuisance parameters, those that stand out where they cost least; those without an answer as they were.
     pub(in crate::diagnose) fn restarted(&self, full: &[f64], clips: Clips, weights: &[f64]) -> Clips {
         self.restarted_below(full, clips, weights, f64::INFINITY)
@@ -92,7 +92,7 @@ mod tests {
     use inference::estimate::{ClipModel, Impossible, Random};
     use inference::interrupt::Interrupt;
     use inference::likelihood::random_effects::{RandomEffects, WithOwn};
-    use inference::likelihood::{Channel, Group, Row, StageName, setting};
+    use inference::likelihood::{Channel, Group, Likelihood, Row, StageName, setting};
     use shared_mem::msg::MAX_JOINTS;
 
     const SIGMA: f64 = 0.02;

@@ -12,7 +12,7 @@
 use crate::diagnose::library::{Alternative, Library};
 use inference::estimate::{Eliminated, Impossible};
 use inference::kept::numbers;
-use inference::likelihood::random_effects::RandomEffects;
+use inference::likelihood::random_effects::{OwnNumbers, RandomEffects};
 use inference::likelihood::random_effects_scale::Around;
 use inference::likelihood::{Group, Likelihood, Reach};
 use nalgebra::{DMatrix, DVector};
@@ -90,8 +90,8 @@ type Batch = Vec<usize>;
 /// # Errors
 /// [`Impossible`] when the point itself has no answer, or `go_on` says no; it is given, before each simulation, the share of a clip
 /// that it is. A column without an answer counts as one that changes nothing.
-pub fn sweep(
-    evidence: &impl Likelihood,
+pub fn sweep<O: OwnNumbers>(
+    evidence: &dyn Likelihood<Own = O>,
     library: &Library,
     point: &Point<'_>,
     scatter: &RandomEffects,
@@ -145,8 +145,8 @@ fn number_of(library: &Library, column: Column) -> usize {
     }
 }
 
-struct Work<'a, E, G> {
-    evidence: &'a E,
+struct Work<'a, O: OwnNumbers, G> {
+    evidence: &'a dyn Likelihood<Own = O>,
     library: &'a Library,
     full: &'a [f64],
     columns: &'a [Column],
@@ -155,7 +155,7 @@ struct Work<'a, E, G> {
     go_on: &'a G,
 }
 
-impl<E: Likelihood, G: Fn(f64) -> bool + Sync> Work<'_, E, G> {
+impl<O: OwnNumbers, G: Fn(f64) -> bool + Sync> Work<'_, O, G> {
     fn clip(&self, clip: usize, own: &[f64]) -> Result<SweptClip, Impossible> {
         let mut base = Vec::new();
         self.evidence.residuals(clip, self.full, own, &mut base)?;
@@ -261,7 +261,11 @@ impl Swept {
     ///
     /// # Errors
     /// As of [`Eliminated::of`].
-    pub fn reduced(&self, evidence: &impl Likelihood, weights: &[f64]) -> Result<Vec<Reduced>, Impossible> {
+    pub fn reduced<O: OwnNumbers>(
+        &self,
+        evidence: &dyn Likelihood<Own = O>,
+        weights: &[f64],
+    ) -> Result<Vec<Reduced>, Impossible> {
         self.clips.par_iter().map(|clip| self.reduce(clip, evidence, weights)).collect()
     }
 
@@ -269,13 +273,22 @@ impl Swept {
     ///
     /// # Errors
     /// As of [`Self::reduced`].
-    pub fn total(&self, evidence: &impl Likelihood, weights: &[f64]) -> Result<DMatrix<f64>, Impossible> {
+    pub fn total<O: OwnNumbers>(
+        &self,
+        evidence: &dyn Likelihood<Own = O>,
+        weights: &[f64],
+    ) -> Result<DMatrix<f64>, Impossible> {
         let size = 1 + self.columns.len();
         let forms = self.reduced(evidence, weights)?;
         Ok(forms.iter().fold(DMatrix::zeros(size, size), |sum, clip| sum + &clip.form))
     }
 
-    fn reduce(&self, clip: &SweptClip, evidence: &impl Likelihood, weights: &[f64]) -> Result<Reduced, Impossible> {
+    fn reduce<O: OwnNumbers>(
+        &self,
+        clip: &SweptClip,
+        evidence: &dyn Likelihood<Own = O>,
+        weights: &[f64],
+    ) -> Result<Reduced, Impossible> {
         let gram = gram(clip, evidence, weights);
         // The residual and the clip's nuisance parameters, without the columns between them.
         let of_clip = |k: usize| if k == 0 { 0 } else { self.columns.len() + k };
@@ -295,11 +308,11 @@ impl Swept {
     ///
     /// # Errors
     /// [`Impossible`] where the clip has no answer there, and as of [`Eliminated::of`].
-    pub(super) fn own_there(
+    pub(super) fn own_there<O: OwnNumbers>(
         &self,
         clip: &SweptClip,
         ahead: Vec<f64>,
-        evidence: &impl Likelihood,
+        evidence: &dyn Likelihood<Own = O>,
         (full, weights): (&[f64], &[f64]),
     ) -> Result<Vec<f64>, Impossible> {
         if self.scatter.count() == 0 {
@@ -316,10 +329,10 @@ impl Swept {
     ///
     /// # Errors
     /// As of [`Eliminated::of`].
-    pub fn own_after(
+    pub fn own_after<O: OwnNumbers>(
         &self,
         clip: &SweptClip,
-        evidence: &impl Likelihood,
+        evidence: &dyn Likelihood<Own = O>,
         weights: &[f64],
         at: &DVector<f64>,
     ) -> Result<Vec<f64>, Impossible> {
@@ -332,7 +345,7 @@ impl Swept {
 }
 
 /// Products of all columns of a clip, weighted.
-fn gram(clip: &SweptClip, evidence: &impl Likelihood, weights: &[f64]) -> DMatrix<f64> {
+fn gram<O: OwnNumbers>(clip: &SweptClip, evidence: &dyn Likelihood<Own = O>, weights: &[f64]) -> DMatrix<f64> {
     let mut weighted = clip.matrix.clone();
     let factors: Vec<f64> = evidence.rows(clip.clip).iter().map(|row| weights[row.channel]).collect();
     for mut column in weighted.column_iter_mut() {

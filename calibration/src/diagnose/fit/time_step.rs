@@ -7,12 +7,11 @@
 
 use super::bench::{Bench, Hypothesis};
 use super::sweep::Precision;
-use inference::likelihood::Evidence;
 use nalgebra::DVector;
 
 /// How far each free number of a hypothesis would move; `None` where clips cannot be integrated in other steps, as those with an
 /// object. `weights`: those that it was fitted with.
-pub fn error<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
+pub fn error(bench: &Bench<'_>, hypothesis: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
     let clips = hypothesis.clips_with_own();
     // Asked first: where there is no answer nothing need be linearised.
     let halves: Vec<Vec<f64>> =

@@ -3,7 +3,7 @@
 
 use super::bench::{Bench, FittedClip, Hypothesis};
 use super::floor;
-use inference::likelihood::{Evidence, Likelihood};
+use inference::likelihood::random_effects::OwnNumbers;
 use twin::effects::Search;
 
 /// What a number may change of the clips' squared residuals, as a share and at least, and still be one that nothing depends
@@ -12,7 +12,7 @@ const MAX_CHANGE_SHARE: f64 = 1e-6;
 const MIN_CHANGE: f64 = 1.0;
 
 /// The hypothesis with the sizes of its effects on the arm at rest that nothing depends on, and no longer free.
-pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hypothesis {
+pub fn without(bench: &Bench<'_>, hypothesis: &Hypothesis) -> Hypothesis {
     let mut out = hypothesis.clone();
     for effect in &hypothesis.effects {
         for k in sizes(bench, hypothesis, *effect) {
@@ -23,7 +23,7 @@ pub fn without<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Hy
 }
 
 /// The sizes of an effect on the arm that nothing depends on.
-pub fn sizes<E: Likelihood>(bench: &Bench<'_, E>, hypothesis: &Hypothesis<E::Own>, effect: usize) -> Vec<usize> {
+pub fn sizes<O: OwnNumbers>(bench: &Bench<'_, O>, hypothesis: &Hypothesis<O>, effect: usize) -> Vec<usize> {
     let candidate = &bench.library.candidates[effect];
     // Of one number it is known that something depends on it: it was found.
     if !candidate.is_of_arm() || candidate.sizes.len() < 2 {

@@ -7,7 +7,7 @@ use crate::words::quantity::Unit;
 use crate::words::words;
 use inference::estimate::interval::{LEVEL, half_width};
 use inference::estimate::quadratic::minimum;
-use inference::likelihood::{Evidence, Group};
+use inference::likelihood::Group;
 use nalgebra::DMatrix;
 use shared_mem::time::TICK;
 use twin::effects::Place;
@@ -21,7 +21,7 @@ struct Own {
 }
 
 /// A sentence for every time of an effect of a hypothesis that the joints do not share.
-pub(crate) fn of_joints<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<String> {
+pub(crate) fn of_joints(bench: &Bench<'_>, hypothesis: &Hypothesis) -> Vec<String> {
     let library = bench.library;
     let shared = |effect: &usize| {
         let info = &library.candidates[*effect];
@@ -37,7 +37,7 @@ pub(crate) fn of_joints<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothes
 }
 
 /// The number as each joint has it.
-fn own<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, number: usize) -> Option<Vec<Own>> {
+fn own(bench: &Bench<'_>, hypothesis: &Hypothesis, number: usize) -> Option<Vec<Own>> {
     let (library, free) = (bench.library, &hypothesis.free[..]);
     let clips = bench.with_own(&hypothesis.clips(), Some(hypothesis));
     let swept = bench.linearise(&hypothesis.full, free, &clips, Precision::Joints)?;
@@ -60,7 +60,7 @@ fn own<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, number: usize
 }
 
 /// For every clip the quadratic form over the residuals of a joint's own rows and some of the columns.
-fn forms<E: Evidence>(bench: &Bench<'_, E>, swept: &Swept, numbers: &[usize], joint: usize) -> Vec<DMatrix<f64>> {
+fn forms(bench: &Bench<'_>, swept: &Swept, numbers: &[usize], joint: usize) -> Vec<DMatrix<f64>> {
     let place = |k: &usize| swept.columns.iter().position(|column| *column == Column::Number(*k)).map(|at| at + 1);
     let places: Vec<usize> = std::iter::once(0).chain(numbers.iter().filter_map(place)).collect();
     let channels = bench.evidence.channels();

@@ -5,7 +5,7 @@ use super::gap::{Residuals, Typical};
 use crate::answer::diagnosis::SensorGap;
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use inference::admit::Split;
-use inference::likelihood::{Evidence, Group};
+use inference::likelihood::Group;
 
 /// A cause closes more than this share of the gap: what helps only beside nuisance parameters of clips is none. A gap that widens by less
 /// does so by chance, and what leaves more of what the best gains on the arm is not what acts there (a choice).
@@ -32,12 +32,7 @@ impl Closed {
 }
 
 /// What closes; `whole`: what the baseline leaves.
-pub fn closes<E: Evidence>(
-    bench: &Bench<'_, E>,
-    split: &Split,
-    whole: &[Typical],
-    hypotheses: [&Hypothesis; 2],
-) -> Closed {
+pub fn closes(bench: &Bench<'_>, split: &Split, whole: &[Typical], hypotheses: [&Hypothesis; 2]) -> Closed {
     let on = |clips: &[usize]| -> Option<Vec<f64>> {
         let [before, after] = hypotheses.map(|hypothesis| Residuals::at(bench, hypothesis, clips));
         let (before, after) = (before?, after?);

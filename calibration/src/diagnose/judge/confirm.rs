@@ -11,7 +11,6 @@ use super::score::predict_unseen;
 use crate::diagnose::fit::bench::Bench;
 use crate::diagnose::select::gain::Gain;
 use crate::diagnose::work::DiagnoseError;
-use inference::likelihood::Evidence;
 
 /// What they say.
 pub(in crate::diagnose) struct Confirmation {
@@ -27,8 +26,8 @@ pub(in crate::diagnose) struct Confirmation {
 ///
 /// # Errors
 /// [`DiagnoseError::NoBaseline`] where the twin has no answer.
-pub(in crate::diagnose) fn confirm<E: Evidence>(
-    bench: &Bench<'_, E>,
+pub(in crate::diagnose) fn confirm(
+    bench: &Bench<'_>,
     weights: &[f64],
     both: [&HeldOut; 2],
     seed: u64,

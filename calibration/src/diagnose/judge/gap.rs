@@ -80,17 +80,17 @@ const WITH_A_GAP: [Group; 2] = [Group::Arm, Group::Object];
 
 impl Residuals {
     /// Of clips at the numbers of a hypothesis.
-    pub fn at<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, clips: &[usize]) -> Option<Self> {
+    pub fn at(bench: &Bench<'_>, hypothesis: &Hypothesis, clips: &[usize]) -> Option<Self> {
         Self::each(bench, &clips.iter().map(|clip| (*clip, &hypothesis.full[..])).collect::<Vec<_>>())
     }
 
     /// Of clips that were not fitted, each at its nuisance parameters.
-    pub fn of<E: Evidence>(bench: &Bench<'_, E>, fits: &[(Hypothesis, Vec<usize>)]) -> Option<Self> {
+    pub fn of(bench: &Bench<'_>, fits: &[(Hypothesis, Vec<usize>)]) -> Option<Self> {
         let clips = fits.iter().flat_map(|(fit, clips)| clips.iter().map(|clip| (*clip, &fit.full[..])));
         Self::each(bench, &clips.collect::<Vec<_>>())
     }
 
-    fn each<E: Evidence>(bench: &Bench<'_, E>, clips: &[(usize, &[f64])]) -> Option<Self> {
+    fn each(bench: &Bench<'_>, clips: &[(usize, &[f64])]) -> Option<Self> {
         let nothing = vec![0.0; bench.scatter.count()];
         let one = |(clip, full): &(usize, &[f64])| {
             let mut out = Vec::new();
@@ -132,7 +132,7 @@ impl Residuals {
     }
 
     /// The arm's group joint by joint, as [`Self::typical`]; joints that no clip shows are left out.
-    pub fn typical_of_joints<E: Evidence>(&self, bench: &Bench<'_, E>) -> Vec<(usize, Typical)> {
+    pub fn typical_of_joints(&self, bench: &Bench<'_>) -> Vec<(usize, Typical)> {
         let channels = bench.evidence.channels();
         let noise: Vec<Vec<f64>> = self.clips.iter().map(|(clip, _)| noise_of_rows(bench, *clip)).collect();
         let of_joint = |joint: usize| {
@@ -231,7 +231,7 @@ const BOOTSTRAP_DRAWS: usize = 1000;
 const MIN_PIECES: usize = 8;
 
 /// Sums of a clip cut into so many pieces of the same duration.
-fn pieces(evidence: &impl Evidence, clip: usize, residuals: &[f64], cut: usize) -> Vec<Sums> {
+fn pieces(evidence: &Evidence<'_>, clip: usize, residuals: &[f64], cut: usize) -> Vec<Sums> {
     let rows = evidence.rows(clip);
     let last = rows.iter().map(|row| row.time).fold(f64::MIN_POSITIVE, f64::max);
     let mut pieces = vec![Sums::default(); cut];
@@ -249,7 +249,7 @@ fn geometric_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// What noise of one sigma and nuisance parameters that scatter as assumed would give, row by row.
-fn noise_of_rows<E: Evidence>(bench: &Bench<'_, E>, clip: usize) -> Vec<f64> {
+fn noise_of_rows(bench: &Bench<'_>, clip: usize) -> Vec<f64> {
     let rows = bench.evidence.rows(clip);
     let mut squares = vec![1.0; rows.len()];
     for (k, random) in bench.scatter.random.iter().enumerate() {

@@ -10,7 +10,6 @@ use crate::diagnose::fit::effort::{REFINEMENT, THOROUGH};
 use crate::diagnose::fit::left_out::numbers_without;
 use crate::diagnose::work::DiagnoseError;
 use inference::admit::Split;
-use inference::likelihood::Evidence;
 
 /// A hypothesis for every clip that is judged: numbers, and clips that they were not fitted to.
 pub(in crate::diagnose) type Fits = Vec<(Hypothesis, Vec<usize>)>;
@@ -25,7 +24,7 @@ pub(in crate::diagnose) struct HeldOut {
 
 impl HeldOut {
     /// `None` where the twin has no answer.
-    pub(in crate::diagnose) fn of<E: Evidence>(bench: &Bench<'_, E>, fits: Fits) -> Option<Self> {
+    pub(in crate::diagnose) fn of(bench: &Bench<'_>, fits: Fits) -> Option<Self> {
         Some(Self { left: Residuals::of(bench, &fits)?, fits })
     }
 }
@@ -41,8 +40,8 @@ pub(in crate::diagnose) struct Measured {
 impl Measured {
     /// # Errors
     /// [`DiagnoseError::NoBaseline`] where the twin has no answer without one of the commands.
-    pub(in crate::diagnose) fn of<E: Evidence>(
-        bench: &Bench<'_, E>,
+    pub(in crate::diagnose) fn of(
+        bench: &Bench<'_>,
         split: &Split,
         hypothesis: &Hypothesis,
         weights: &[f64],
@@ -57,12 +56,7 @@ impl Measured {
 }
 
 /// A hypothesis fitted to all clips, from where those of the search have it.
-fn of_all<E: Evidence>(
-    bench: &Bench<'_, E>,
-    split: &Split,
-    hypothesis: &Hypothesis,
-    weights: &[f64],
-) -> Option<Hypothesis> {
+fn of_all(bench: &Bench<'_>, split: &Split, hypothesis: &Hypothesis, weights: &[f64]) -> Option<Hypothesis> {
     if split.is_of_few() || bench.interrupt.asked() {
         return Some(hypothesis.clone());
     }
@@ -72,8 +66,8 @@ fn of_all<E: Evidence>(
 }
 
 /// Numbers for every command: `hypothesis` was fitted to all. `None` where the twin has no answer without one of them.
-pub(in crate::diagnose) fn fits<E: Evidence>(
-    bench: &Bench<'_, E>,
+pub(in crate::diagnose) fn fits(
+    bench: &Bench<'_>,
     split: &Split,
     hypothesis: &Hypothesis,
     weights: &[f64],
@@ -90,7 +84,7 @@ pub(in crate::diagnose) fn fits<E: Evidence>(
 }
 
 /// Numbers for every command, one Newton step away from the fit of a hypothesis where that saw the command's clips.
-fn by_influence<E: Evidence>(bench: &Bench<'_, E>, split: &Split, hypothesis: &Hypothesis) -> Fits {
+fn by_influence(bench: &Bench<'_>, split: &Split, hypothesis: &Hypothesis) -> Fits {
     let without = |out: &Vec<usize>| {
         let Hypothesis { effects, free, .. } = hypothesis;
         let full = numbers_without(bench, hypothesis, out);
@@ -101,11 +95,7 @@ fn by_influence<E: Evidence>(bench: &Bench<'_, E>, split: &Split, hypothesis: &H
 
 /// What a hypothesis of the search leaves on clips that its numbers were not fitted to, without a fit: a fit of each would be most of
 /// the work of a diagnosis.
-pub(in crate::diagnose) fn estimated<E: Evidence>(
-    bench: &Bench<'_, E>,
-    split: &Split,
-    hypothesis: &Hypothesis,
-) -> Option<Residuals> {
+pub(in crate::diagnose) fn estimated(bench: &Bench<'_>, split: &Split, hypothesis: &Hypothesis) -> Option<Residuals> {
     Residuals::of(bench, &by_influence(bench, split, hypothesis))
 }
 

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 const MIN_SHARE: f64 = 0.005;
 
 /// Cells, largest first. A residual's noise alone would square to 1.
-pub fn localise(evidence: &impl Evidence, residuals: &Residuals) -> Vec<Place> {
+pub fn localise(evidence: &Evidence<'_>, residuals: &Residuals) -> Vec<Place> {
     let mut cells: BTreeMap<(String, String, &'static str), f64> = BTreeMap::new();
     for (clip, residuals) in &residuals.clips {
         for (row, residual) in evidence.rows(*clip).iter().zip(residuals) {

@@ -10,15 +10,14 @@ use crate::diagnose::fit::effort::{Effort, REFINEMENT};
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::gain::Gain;
 use inference::admit::Split;
-use inference::likelihood::Evidence;
 
 /// A model is worth this share more of what an effect is worth in it than the same with another in that place (a choice): two of nearly
 /// the same worth do the same.
 const LEAD_SHARE: f64 = 0.2;
 
 /// What a search ended with, and how it predicts clips that it was not fitted to.
-pub(in crate::diagnose) struct FinalModel<'a, E> {
-    bench: &'a Bench<'a, E>,
+pub(in crate::diagnose) struct FinalModel<'a> {
+    bench: &'a Bench<'a>,
     split: &'a Split,
     last: &'a Hypothesis,
     /// Weights of the channels under which it was fitted.
@@ -32,10 +31,10 @@ struct Other {
     gain: Gain,
 }
 
-impl<'a, E: Evidence> FinalModel<'a, E> {
+impl<'a> FinalModel<'a> {
     /// `None` where the twin has no answer.
     pub(in crate::diagnose) fn new(
-        bench: &'a Bench<'a, E>,
+        bench: &'a Bench<'a>,
         split: &'a Split,
         last: &'a Hypothesis,
         weights: &'a [f64],

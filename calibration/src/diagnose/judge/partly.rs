@@ -18,7 +18,6 @@ use crate::answer::diagnosis::Share;
 use crate::diagnose::criteria::MOST_OF_IT;
 use crate::diagnose::fit::bench::Bench;
 use inference::admit::Split;
-use inference::likelihood::Evidence;
 
 /// What is proven.
 pub(in crate::diagnose) struct Partly {
@@ -35,8 +34,8 @@ pub(in crate::diagnose) struct Partly {
 }
 
 /// The most effects that are proven; `None` where not even the first is. `before`: what the baseline leaves on held-out clips.
-pub(in crate::diagnose) fn proven<E: Evidence>(
-    bench: &Bench<'_, E>,
+pub(in crate::diagnose) fn proven(
+    bench: &Bench<'_>,
     split: &Split,
     found: &Found,
     before: &Residuals,
@@ -75,13 +74,13 @@ fn with_effects(steps: &[Step], count: usize) -> Option<&Step> {
 
 impl Partly {
     /// Names of the effects that are proven, and of those that do as well as one of them.
-    pub(in crate::diagnose) fn effects<E>(&self, bench: &Bench<'_, E>) -> [Vec<String>; 2] {
+    pub(in crate::diagnose) fn effects(&self, bench: &Bench<'_>) -> [Vec<String>; 2] {
         let name = |effect: &usize| bench.library.name(*effect).to_owned();
         [&self.found.last.effects, &self.rivals].map(|effects| effects.iter().map(name).collect())
     }
 
     /// The effect whose signature explains most of what stays; `None` where none explains much of it.
-    pub(in crate::diagnose) fn looks_like<E>(&self, bench: &Bench<'_, E>) -> Option<&'static str> {
+    pub(in crate::diagnose) fn looks_like(&self, bench: &Bench<'_>) -> Option<&'static str> {
         let step = self.found.steps.iter().find(|step| step.from.effects == self.found.last.effects)?;
         let best = step.trials.iter().max_by(|a, b| a.scored.cosine.total_cmp(&b.scored.cosine))?;
         let alike = best.scored.cosine.powi(2) > MOST_OF_IT;

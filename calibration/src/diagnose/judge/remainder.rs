@@ -12,7 +12,6 @@ use crate::diagnose::criteria::{
 };
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::fit::parameters;
-use inference::likelihood::Evidence;
 use twin::effects::Role;
 
 impl SensorGap {
@@ -82,7 +81,7 @@ pub struct Left {
 }
 
 impl Left {
-    pub fn of<E: Evidence>(bench: &Bench<'_, E>, before: &Residuals, after: &Residuals) -> Self {
+    pub fn of(bench: &Bench<'_>, before: &Residuals, after: &Residuals) -> Self {
         let [in_joints, of_joints] = [before, after].map(|residuals| residuals.typical_of_joints(bench));
         let joint = |((joint, before), (_, after)): (&(usize, Typical), &(usize, Typical))| JointGap {
             joint: joint + 1,
@@ -103,7 +102,7 @@ const MAX_BEYOND_RANGE: f64 = 0.05;
 
 /// Effects of a hypothesis that are stronger than what is plausible, whatever of their intervals is true: what stopped at an
 /// end of its search is at least as strong as that.
-pub fn implausible<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis) -> Vec<usize> {
+pub fn implausible(bench: &Bench<'_>, hypothesis: &Hypothesis) -> Vec<usize> {
     let beyond = |effect: &usize| {
         let sizes = parameters::of_effect(bench, hypothesis, *effect);
         let stopped = ends::stopped(bench.library, *effect, &hypothesis.full);

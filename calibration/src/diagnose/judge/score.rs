@@ -11,7 +11,6 @@ use crate::diagnose::fit::left_out::shift_to;
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::gain::Gain;
 use inference::estimate::quadratic::value;
-use inference::likelihood::Evidence;
 use inference::likelihood::random_effects_scale::{Around, at_the_best_scale};
 
 /// Deviance of every judged clip out of sample, and what it says about numbers.
@@ -22,12 +21,7 @@ pub struct Predicted {
 }
 
 /// Predicts training and choosing clips.
-pub fn predict<E: Evidence>(
-    bench: &Bench<'_, E>,
-    hypothesis: &Hypothesis,
-    choose: &[usize],
-    weights: &[f64],
-) -> Option<Predicted> {
+pub fn predict(bench: &Bench<'_>, hypothesis: &Hypothesis, choose: &[usize], weights: &[f64]) -> Option<Predicted> {
     let left_out = left_out(bench, hypothesis, weights);
     let judged = bench.judge(hypothesis, choose, weights)?;
     let all: Vec<&FittedClip> = hypothesis.fitted.iter().chain(&judged).collect();
@@ -36,11 +30,7 @@ pub fn predict<E: Evidence>(
 }
 
 /// Predicts clips by numbers that were fitted to others.
-pub(in crate::diagnose) fn predict_unseen<E: Evidence>(
-    bench: &Bench<'_, E>,
-    fits: &Fits,
-    weights: &[f64],
-) -> Option<Predicted> {
+pub(in crate::diagnose) fn predict_unseen(bench: &Bench<'_>, fits: &Fits, weights: &[f64]) -> Option<Predicted> {
     let judged: Option<Vec<_>> = fits.iter().map(|(fit, clips)| bench.judge(fit, clips, weights)).collect();
     let judged = judged?.concat();
     let deviances = judged.iter().map(|clip| (clip.clip, clip.deviance())).collect();
@@ -48,7 +38,7 @@ pub(in crate::diagnose) fn predict_unseen<E: Evidence>(
 }
 
 /// With the scatter between clips as wide as makes all of them most likely.
-fn at_one_scale<E>(bench: &Bench<'_, E>, clips: &[&FittedClip], mut deviances: Vec<(usize, f64)>) -> Predicted {
+fn at_one_scale(bench: &Bench<'_>, clips: &[&FittedClip], mut deviances: Vec<(usize, f64)>) -> Predicted {
     let around: Vec<&Around> = clips.iter().map(|clip| &clip.reduced.around).collect();
     for ((_, deviance), change) in deviances.iter_mut().zip(at_the_best_scale(&around, &bench.scatter)) {
         *deviance += change;
@@ -56,7 +46,7 @@ fn at_one_scale<E>(bench: &Bench<'_, E>, clips: &[&FittedClip], mut deviances: V
     Predicted { clips: deviances }
 }
 
-fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights: &[f64]) -> Vec<(usize, f64)> {
+fn left_out(bench: &Bench<'_>, hypothesis: &Hypothesis, weights: &[f64]) -> Vec<(usize, f64)> {
     let all: Vec<usize> = (1..=hypothesis.free.len()).collect();
     let total = bench.held(hypothesis);
     let one = |clip: &FittedClip| {
@@ -71,8 +61,8 @@ fn left_out<E: Evidence>(bench: &Bench<'_, E>, hypothesis: &Hypothesis, weights:
 }
 
 /// Deviance of a clip with the free numbers shifted; `None` where the twin has no answer there.
-fn simulated<E: Evidence>(
-    bench: &Bench<'_, E>,
+fn simulated(
+    bench: &Bench<'_>,
     hypothesis: &Hypothesis,
     clip: &FittedClip,
     shift: &[f64],

@@ -36,8 +36,8 @@ impl Sizes {
     ///
     /// # Errors
     /// [`DiagnoseError`] when a clip cannot be replayed.
-    pub(in crate::diagnose) fn of<E: Evidence>(
-        bench: &Bench<'_, E>,
+    pub(in crate::diagnose) fn of(
+        bench: &Bench<'_>,
         both: [&HeldOut; 2],
         session: &Session,
         admitted: &Admitted,
@@ -59,8 +59,8 @@ impl Sizes {
     }
 
     /// Of clips at two hypotheses by the code of `twin replay`; of strokes by whoever simulates them.
-    fn replayed<E: Evidence>(
-        bench: &Bench<'_, E>,
+    fn replayed(
+        bench: &Bench<'_>,
         both: [&HeldOut; 2],
         session: &Session,
         admitted: &Admitted,
@@ -111,8 +111,8 @@ impl Sizes {
 }
 
 /// Whether the gap is of no interest without effects and with them.
-pub(in crate::diagnose) fn within_tolerance<E: Evidence>(
-    bench: &Bench<'_, E>,
+pub(in crate::diagnose) fn within_tolerance(
+    bench: &Bench<'_>,
     both: [&HeldOut; 2],
     session: &Session,
     admitted: &Admitted,
@@ -144,8 +144,8 @@ fn size_in_words(torques: Option<f64>, joints: Option<f64>, add: Option<f64>) ->
 }
 
 /// What every clip leaves at numbers that were not fitted to it.
-fn replayed<E: Evidence>(
-    bench: &Bench<'_, E>,
+fn replayed(
+    bench: &Bench<'_>,
     held_out: &HeldOut,
     session: &Session,
     admitted: &Admitted,
@@ -170,7 +170,7 @@ fn mean_square_of_joints(gap: &replay::Gap) -> Option<f64> {
 
 /// Root mean square of each joint's torque beyond the predicted one at two hypotheses [N m]; `None` where torques are no channel
 /// of their own.
-fn torque_rms(evidence: &impl Evidence, both: [&HeldOut; 2]) -> Option<TorqueRms> {
+fn torque_rms(evidence: &Evidence<'_>, both: [&HeldOut; 2]) -> Option<TorqueRms> {
     let sigma = evidence.torque_sigma()?;
     let [before, after] = both.map(|held_out| {
         let of = |(channel, sigma): (usize, &f64)| {

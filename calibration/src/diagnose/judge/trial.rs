@@ -11,7 +11,6 @@ use crate::diagnose::library::Library;
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::gain::Gain;
 use inference::admit::Split;
-use inference::likelihood::Evidence;
 use twin::effects::Stage;
 
 /// An effect on the arm must be worth more than this for each of its residuals [nats]: there are so many that the least numerics add up.
@@ -128,7 +127,7 @@ impl Found {
     /// For every step, how many times what the search left of an arm's clips exceeds what was taken for noise in it, at least
     /// 1: so many times less do differences between candidates say. Weights come from slopes, with all candidates at once; a
     /// real arm deviates far more under all that is named. Clips with nuisance parameters take that up.
-    pub fn overdispersion<E: Evidence>(&self, bench: &Bench<'_, E>) -> Vec<f64> {
+    pub fn overdispersion(&self, bench: &Bench<'_>) -> Vec<f64> {
         let left = (bench.scatter.count() == 0).then(|| Residuals::at(bench, &self.last, &self.last.clips())).flatten();
         let Some(left) = left else { return vec![1.0; self.steps.len()] };
         let weights = floor::weights(bench.evidence, &left.clips);
@@ -156,7 +155,7 @@ impl Found {
 impl Step {
     /// The trial that is worth most among those worth it. Of those that are worth the same as far as clips tell, what has a mass, a
     /// length or a friction behind it explains before what needs none.
-    pub fn best<E: Evidence>(&self, bench: &Bench<'_, E>) -> Option<(&Trial, &Hypothesis, &Gain)> {
+    pub fn best(&self, bench: &Bench<'_>) -> Option<(&Trial, &Hypothesis, &Gain)> {
         let fitted = self.trials.iter().filter_map(|trial| trial.fitted.as_ref().map(|(fit, gain)| (trial, fit, gain)));
         let mut convincing_ones: Vec<(&Trial, &Hypothesis, &Gain)> =
             fitted.filter(|(trial, fit, gain)| self.convinces(bench, trial, fit, gain)).collect();
@@ -181,7 +180,7 @@ impl Step {
     }
 
     /// Whether it is no chance that a trial gains this, and what it gains no numerics.
-    fn convinces<E: Evidence>(&self, bench: &Bench<'_, E>, trial: &Trial, fit: &Hypothesis, gain: &Gain) -> bool {
+    fn convinces(&self, bench: &Bench<'_>, trial: &Trial, fit: &Hypothesis, gain: &Gain) -> bool {
         let (library, candidate) = (bench.library, trial.scored.candidate);
         // How joints yield in contact, any two engines differ by: for what changes the hit it shows nothing.
         let of_hit = library.candidates[candidate].effect.stage == Stage::Hit;
@@ -202,9 +201,9 @@ impl Step {
     }
 
     /// The same with fits of trials, at their places, judged by what they predict and close.
-    pub(in crate::diagnose) fn with_fits<E: Evidence>(
+    pub(in crate::diagnose) fn with_fits(
         mut self,
-        bench: &Bench<'_, E>,
+        bench: &Bench<'_>,
         split: &Split,
         fits: impl IntoIterator<Item = (usize, Hypothesis)>,
     ) -> Self {

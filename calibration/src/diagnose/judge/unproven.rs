@@ -4,7 +4,6 @@
 use super::trial::{Found, LARGE_SHARE_CLOSED, Trial};
 use crate::diagnose::fit::bench::{Bench, Hypothesis};
 use crate::diagnose::select::criteria::EFFECTS;
-use inference::likelihood::Evidence;
 
 /// An effect that is likely, and not proven.
 pub(in crate::diagnose) struct Unproven<'a> {
@@ -18,15 +17,15 @@ pub(in crate::diagnose) struct Unproven<'a> {
 }
 
 impl Unproven<'_> {
-    pub(in crate::diagnose) fn effect<E>(&self, bench: &Bench<'_, E>) -> &'static str {
+    pub(in crate::diagnose) fn effect(&self, bench: &Bench<'_>) -> &'static str {
         bench.library.name(self.trial.scored.candidate)
     }
 }
 
 /// The likeliest such effect; `None` where something was found, or where none closes a real part of the gap. `cut`: how many
 /// clips there are, where parts of them judge.
-pub(in crate::diagnose) fn unproven<'a, E: Evidence>(
-    bench: &Bench<'_, E>,
+pub(in crate::diagnose) fn unproven<'a>(
+    bench: &Bench<'_>,
     found: &'a Found,
     cut: Option<usize>,
 ) -> Option<Unproven<'a>> {

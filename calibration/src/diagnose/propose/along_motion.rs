@@ -11,8 +11,9 @@ use super::Around;
 use crate::diagnose::known_gains;
 use crate::diagnose::library::{Candidate, Library};
 use inference::estimate::Unknown;
+use inference::likelihood::Setting;
 use inference::likelihood::arm::following::Moment;
-use inference::likelihood::{Likelihood, Setting};
+use inference::likelihood::random_effects::OwnNumbers;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -33,7 +34,7 @@ const REWEIGHTINGS: usize = 15;
 const CAUCHY_SCALE: f64 = 2.385;
 
 /// Numbers at which the fit of a candidate begins; `None` where it is no dry friction, the gains are known, or the law is another.
-pub(in crate::diagnose) fn start<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate) -> Option<Vec<f64>> {
+pub(in crate::diagnose) fn start<O: OwnNumbers>(at: &Around<'_, O>, candidate: &Candidate) -> Option<Vec<f64>> {
     let (library, from) = (at.bench.library, at.from);
     let joints = Joint::all(library, candidate);
     if joints.is_empty() {
@@ -65,7 +66,7 @@ pub(in crate::diagnose) fn start<E: Likelihood>(at: &Around<'_, E>, candidate: &
 }
 
 /// What the clips of a hypothesis cost in the channels of each joint at other numbers.
-fn of_joints<E: Likelihood>(at: &Around<'_, E>, full: &[f64]) -> Vec<f64> {
+fn of_joints<O: OwnNumbers>(at: &Around<'_, O>, full: &[f64]) -> Vec<f64> {
     let Around { bench, from, weights } = at;
     let channels = bench.evidence.channels();
     let dof = channels.iter().filter_map(|channel| channel.joint).max().map_or(0, |last| last + 1);

@@ -16,11 +16,11 @@ use inference::likelihood::random_effects::{RandomEffects, WithoutOwn};
 use inference::likelihood::{Channel, Evidence, Likelihood, Near, Reach, Row};
 
 /// The same clips, rows and channels; residuals of the object are zero, and clips have no nuisance parameters.
-pub struct ArmAlone<'a, E>(pub &'a E);
+pub struct ArmAlone<'a>(pub &'a Evidence<'a>);
 
-impl<E: Evidence> ArmAlone<'_, E> {
+impl ArmAlone<'_> {
     /// A bench for these.
-    pub fn bench<'b>(&'b self, whole: &Bench<'b, E>) -> Bench<'b, Self> {
+    pub fn bench<'b>(&'b self, whole: &Bench<'b>) -> Bench<'b, WithoutOwn> {
         whole.seen_as(self, "the arm alone")
     }
 }
@@ -28,8 +28,8 @@ impl<E: Evidence> ArmAlone<'_, E> {
 /// Trials of effects in the joints, at their `places` in a step, fitted to the arm's own channels first; those that explain these about
 /// as well as the best of them are looked at once with the object as well. What an object does after it was hit a little
 /// elsewhere is no judge of joints. `others`: steps of the bar that the caller takes next.
-pub(in crate::diagnose) fn fitted<E: Evidence>(
-    search: &Search<'_, E>,
+pub(in crate::diagnose) fn fitted(
+    search: &Search<'_>,
     step: &Step,
     places: &[usize],
     overlooked: bool,
@@ -76,8 +76,8 @@ pub(in crate::diagnose) fn fitted<E: Evidence>(
 
 /// A fit to the arm alone, looked at with the object: with that of the step, and with one found anew. `open`: numbers of its effect that
 /// the arm leaves open.
-fn with_object<E: Evidence>(
-    search: &Search<'_, E>,
+fn with_object(
+    search: &Search<'_>,
     step: &Step,
     alone: &Hypothesis<WithoutOwn>,
     open: &[usize],
@@ -91,7 +91,7 @@ fn with_object<E: Evidence>(
     search.fits(&alone.effects, &step.weights, &step.from).best(seen, PROBE)
 }
 
-impl<E: Evidence> ClipModel for ArmAlone<'_, E> {
+impl ClipModel for ArmAlone<'_> {
     fn clips(&self) -> usize {
         self.0.clips()
     }
@@ -102,7 +102,7 @@ impl<E: Evidence> ClipModel for ArmAlone<'_, E> {
     }
 }
 
-impl<E: Evidence> Likelihood for ArmAlone<'_, E> {
+impl Likelihood for ArmAlone<'_> {
     type Own = WithoutOwn;
 
     fn changed(
@@ -168,7 +168,7 @@ mod tests {
     }
 
     /// A step from these numbers on two strokes, in which trials of these candidates are to be fitted.
-    fn step<E: Evidence>(bench: &Bench<'_, E>, full: Vec<f64>, even: &[f64], asked: &[usize]) -> (Step, Split) {
+    fn step(bench: &Bench<'_>, full: Vec<f64>, even: &[f64], asked: &[usize]) -> (Step, Split) {
         let trial = |candidate: &usize| Trial::untried(nothing_said_of(bench.library, *candidate), true);
         let step = Step {
             from: bench.fit(&[], full, &[0, 1], even, None, PROBE).expect("a fit"),

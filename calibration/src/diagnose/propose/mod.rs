@@ -21,14 +21,15 @@ use crate::diagnose::fit::multi_start::{MultiStart, Tried};
 use crate::diagnose::fit::shortlist::Scored;
 use crate::diagnose::library::Candidate;
 use inference::admit::Split;
-use inference::likelihood::{Evidence, Group, Likelihood};
+use inference::likelihood::Group;
+use inference::likelihood::random_effects::{OwnNumbers, WithOwn};
 use inference::witness::Witness;
 use shared_mem::msg::MAX_JOINTS;
 use shared_mem::progress::Progress;
 
 /// What every step of a search for effects is given.
-pub(in crate::diagnose) struct Search<'a, E> {
-    pub(in crate::diagnose) bench: &'a Bench<'a, E>,
+pub(in crate::diagnose) struct Search<'a> {
+    pub(in crate::diagnose) bench: &'a Bench<'a>,
     pub(in crate::diagnose) split: &'a Split,
     /// Numbers whose object is found anew under the effects in them; `None` where there is no object.
     pub(in crate::diagnose) refined: &'a dyn Fn(&[f64]) -> Option<Vec<f64>>,
@@ -37,52 +38,43 @@ pub(in crate::diagnose) struct Search<'a, E> {
     pub(in crate::diagnose) bar: &'a Progress,
 }
 
-impl<'a, E> Search<'a, E> {
+impl<'a> Search<'a> {
     /// Fits of effects to the clips for fitting, each clip's nuisance parameters from where `near` has them.
     pub(in crate::diagnose) fn fits(
         &'a self,
         effects: &'a [usize],
         weights: &'a [f64],
         near: &'a Hypothesis,
-    ) -> MultiStart<'a, E>
-    where
-        E: Evidence,
-    {
+    ) -> MultiStart<'a> {
         MultiStart { bench: self.bench, effects, clips: &self.split.train, weights, near: Some(near) }
     }
 
     /// A fit gone on with.
-    pub(in crate::diagnose) fn onwards(&self, fit: &Hypothesis, weights: &[f64], effort: Effort) -> Option<Hypothesis>
-    where
-        E: Evidence,
-    {
+    pub(in crate::diagnose) fn onwards(&self, fit: &Hypothesis, weights: &[f64], effort: Effort) -> Option<Hypothesis> {
         self.bench.fit(&fit.effects, fit.full.clone(), &self.split.train, weights, Some(fit), effort)
     }
 
     /// The effort of what is extended and what is found. Where a search leaves clips out, that is fitted to all of them once more, and
     /// exactly ([`Bench::last_pass`]).
-    pub(in crate::diagnose) fn last_pass(&self) -> Effort
-    where
-        E: Evidence,
-    {
+    pub(in crate::diagnose) fn last_pass(&self) -> Effort {
         let exactly = self.bench.last_pass();
         if self.split.is_of_few() { exactly } else { Effort { frees_held: exactly.frees_held, ..REFINEMENT } }
     }
 
     /// This search on another bench of the same clips.
-    pub(in crate::diagnose) fn on<F>(&self, bench: &'a Bench<'a, F>) -> Search<'a, F> {
+    pub(in crate::diagnose) fn on(&self, bench: &'a Bench<'a>) -> Search<'a> {
         Search { bench, split: self.split, refined: self.refined, witnessed: self.witnessed, bar: self.bar }
     }
 }
 
 /// A hypothesis around which starts are looked for, on the clips that it was fitted to.
-pub(in crate::diagnose) struct Around<'a, E: Likelihood> {
-    pub(in crate::diagnose) bench: &'a Bench<'a, E>,
-    pub(in crate::diagnose) from: &'a Hypothesis<E::Own>,
+pub(in crate::diagnose) struct Around<'a, O: OwnNumbers = WithOwn> {
+    pub(in crate::diagnose) bench: &'a Bench<'a, O>,
+    pub(in crate::diagnose) from: &'a Hypothesis<O>,
     pub(in crate::diagnose) weights: &'a [f64],
 }
 
-impl<E: Likelihood> Around<'_, E> {
+impl<O: OwnNumbers> Around<'_, O> {
     fn candidate(&self, scored: &Scored) -> &Candidate {
         &self.bench.library.candidates[scored.candidate]
     }
@@ -157,10 +149,6 @@ impl<E: Likelihood> Around<'_, E> {
 }
 
 #[cfg(test)]
-fn around<'a, E: Likelihood>(
-    bench: &'a Bench<'a, E>,
-    from: &'a Hypothesis<E::Own>,
-    weights: &'a [f64],
-) -> Around<'a, E> {
+fn around<'a, O: OwnNumbers>(bench: &'a Bench<'a, O>, from: &'a Hypothesis<O>, weights: &'a [f64]) -> Around<'a, O> {
     Around { bench, from, weights }
 }

@@ -5,7 +5,8 @@
 //! periodogram over the position instead of over time, by least squares: Lomb 1976).
 
 use super::Around;
-use inference::likelihood::{Likelihood, Reach};
+use inference::likelihood::Reach;
+use inference::likelihood::random_effects::OwnNumbers;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
@@ -35,7 +36,7 @@ impl Waves {
 
 /// Numbers with the candidate's ripple at the order, strength and phase that suit each joint best; `None` where the twin has
 /// no answer. `from`: what acts already, and the clips.
-pub(in crate::diagnose) fn start<E: Likelihood>(at: &Around<'_, E>, candidate: usize) -> Option<Vec<f64>> {
+pub(in crate::diagnose) fn start<O: OwnNumbers>(at: &Around<'_, O>, candidate: usize) -> Option<Vec<f64>> {
     let Around { bench, from, weights } = at;
     let ripple = &bench.library.candidates[candidate];
     let orders: Vec<usize> = ripple.alternatives.first()?.form.iter().map(|(k, _)| *k).collect();

@@ -7,7 +7,6 @@ use crate::diagnose::fit::shortlist::{Scored, TESTABLE};
 use crate::diagnose::judge::gap::Typical;
 use crate::diagnose::judge::trial::Step;
 use crate::diagnose::select::criteria::EFFECTS;
-use inference::likelihood::Evidence;
 use twin::effects::Stage;
 
 /// So many candidates are fitted besides because they stand out at the least scatter, and so many trials of a step once more with the
@@ -22,8 +21,8 @@ const SLIDE_EXCESS: f64 = 0.5 * OBJECT_EXCESS.value;
 /// is: how an object is hit by an arm that is elsewhere tells nothing of the object. Where the object's gap is not small all effects
 /// on the slide are fitted, where it is large all on the hit and of the camera as well: an impact answers so unevenly that slopes at one
 /// point tell little.
-pub(in crate::diagnose) fn to_fit<E: Evidence>(
-    bench: &Bench<'_, E>,
+pub(in crate::diagnose) fn to_fit(
+    bench: &Bench<'_>,
     from: &Hypothesis,
     scored: &[Scored],
     whole: &[Typical],
@@ -78,8 +77,8 @@ pub(in crate::diagnose) fn arm_gap_is_open(whole: &[Typical], left: &[Typical]) 
 }
 
 /// The object's candidates that stand out once clips are held to the least scatter, whatever else the score test says.
-pub(in crate::diagnose) fn seen_at_the_least_scatter<'a, E: Evidence>(
-    bench: &Bench<'_, E>,
+pub(in crate::diagnose) fn seen_at_the_least_scatter<'a>(
+    bench: &Bench<'_>,
     from: &Hypothesis,
     narrow: &'a [Scored],
 ) -> Vec<&'a Scored> {
@@ -97,7 +96,7 @@ pub(in crate::diagnose) fn seen_at_the_least_scatter<'a, E: Evidence>(
 /// Candidates on the arm that the score test passed over although a gap remains there that none of the others explains:
 /// what acts only from some size on, as play does, has no slope at its neutral point. Those on the object all have one, or are
 /// fitted in any case.
-pub(in crate::diagnose) fn overlooked<E: Evidence>(bench: &Bench<'_, E>, step: &Step) -> Vec<usize> {
+pub(in crate::diagnose) fn overlooked(bench: &Bench<'_>, step: &Step) -> Vec<usize> {
     let arm = step.left.iter().find(|group| !group.of_object);
     if !arm.is_some_and(|arm| SensorGap::of_groups(&[*arm], &[*arm])[0].too_much(false)) {
         return Vec::new();

@@ -5,7 +5,7 @@ use crate::diagnose::fit::shortlist::{self, Scored};
 use crate::diagnose::fit::sweep::{Point, Precision, Swept, sweep};
 use crate::diagnose::fit::{floor, stages};
 use inference::admit::Split;
-use inference::likelihood::{Evidence, random_effects_scale};
+use inference::likelihood::random_effects_scale;
 use shared_mem::progress::Progress;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -14,8 +14,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub(in crate::diagnose) type Signatures = (Vec<f64>, Vec<Scored>, Vec<Scored>);
 
 /// The signatures on the clips that are fitted; `None` where the twin has no answer, or the time is spent before all are there.
-pub(in crate::diagnose) fn around<E: Evidence>(
-    bench: &Bench<'_, E>,
+pub(in crate::diagnose) fn around(
+    bench: &Bench<'_>,
     split: &Split,
     from: &Hypothesis,
     bar: &Progress,
@@ -25,7 +25,7 @@ pub(in crate::diagnose) fn around<E: Evidence>(
     bench.trail.0.once(&step, || taken(bench, split, from, bar))
 }
 
-fn taken<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Signatures> {
+fn taken(bench: &Bench<'_>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Signatures> {
     let mut swept = swept(bench, split, from, bar)?;
     let weights = weights(bench, &[&swept])?;
     let scores = |swept: &Swept| {
@@ -40,7 +40,7 @@ fn taken<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, ba
 }
 
 /// Factors on the channels under which what the richest model leaves in some sweeps looks like noise.
-pub(in crate::diagnose) fn weights<E: Evidence>(bench: &Bench<'_, E>, sweeps: &[&Swept]) -> Option<Vec<f64>> {
+pub(in crate::diagnose) fn weights(bench: &Bench<'_>, sweeps: &[&Swept]) -> Option<Vec<f64>> {
     let mut weights = vec![1.0; bench.evidence.channels().len()];
     // Weights depend on what the richest hypothesis leaves, and that on the weights: twice is enough.
     for _ in 0..2 {
@@ -51,7 +51,7 @@ pub(in crate::diagnose) fn weights<E: Evidence>(bench: &Bench<'_, E>, sweeps: &[
     Some(weights)
 }
 
-fn swept<E: Evidence>(bench: &Bench<'_, E>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Swept> {
+fn swept(bench: &Bench<'_>, split: &Split, from: &Hypothesis, bar: &Progress) -> Option<Swept> {
     let clips = bench.with_own(&split.train, Some(from));
     let probed: Vec<usize> = (0..bench.library.candidates.len()).filter(|k| !from.effects.contains(k)).collect();
     let point =

@@ -6,7 +6,8 @@ use super::{Around, along_motion, ripple};
 use crate::diagnose::fit::multi_start::{Tried, cheapest};
 use crate::diagnose::fit::shortlist::{MAX_FORMS, Scored};
 use crate::diagnose::library::Candidate;
-use inference::likelihood::{Likelihood, Setting};
+use inference::likelihood::Setting;
+use inference::likelihood::random_effects::OwnNumbers;
 use twin::effects::{Search, Stage};
 
 /// Shares of the strongest plausible size at which candidates are tried (choices): one whose slope tells little along each direction, and
@@ -31,7 +32,7 @@ const MAX_COST_LEFT: f64 = 0.98;
 const WHOLE_RANGE_UNITS: [f64; 11] = [0.0, -9.0, -7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0, 9.0];
 
 /// Numbers at which fits of a candidate begin, worked out unless they are known; `overlooked`: the score test did not point to it.
-pub(in crate::diagnose) fn kept<E: Likelihood>(at: &Around<'_, E>, scored: &Scored, overlooked: bool) -> Vec<Vec<f64>> {
+pub(in crate::diagnose) fn kept<O: OwnNumbers>(at: &Around<'_, O>, scored: &Scored, overlooked: bool) -> Vec<Vec<f64>> {
     let step = at.bench.step("starts").with(&(scored.candidate, overlooked)).with_numbers(&at.from.full);
     let of = || if overlooked { scanned(at, scored) } else { pointed_at(at, scored) };
     at.bench.trail.0.once(&step.with_numbers(at.weights), of)
@@ -41,7 +42,7 @@ pub(in crate::diagnose) fn kept<E: Likelihood>(at: &Around<'_, E>, scored: &Scor
 /// table) also the forms next to the best; of one beyond the arm also some way to either side, since the object's numbers,
 /// fitted without it, stand in for a part of it; of one whose slope at one point tells little, as where the object is hit
 /// elsewhere, also where the clips cost least.
-fn pointed_at<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64>> {
+fn pointed_at<O: OwnNumbers>(at: &Around<'_, O>, scored: &Scored) -> Vec<Vec<f64>> {
     let candidate = at.candidate(scored);
     let mut starts = vec![scored.clone()];
     if candidate.effect.stage == Stage::Slide {
@@ -84,7 +85,7 @@ pub(in crate::diagnose) fn has_many_minima(candidate: &Candidate) -> bool {
 
 /// Where the clips cost least with a candidate in each of its many forms, friction being another beside it: an edge that lies
 /// elsewhere than it is shows no slope towards its place.
-fn placed<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64>> {
+fn placed<O: OwnNumbers>(at: &Around<'_, O>, scored: &Scored) -> Vec<Vec<f64>> {
     let friction = at.bench.library.settings.settings().iter().position(|setting| *setting == Setting::Friction);
     let mut places: Vec<Tried> = Vec::new();
     for form in in_each_form(at.candidate(scored), scored) {
@@ -105,7 +106,7 @@ fn placed<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64>> {
 
 /// Of a candidate that the score test did not point to, the strength at which the fitted clips cost least, in any form, unless
 /// they cost far more than without it.
-fn scanned<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64>> {
+fn scanned<O: OwnNumbers>(at: &Around<'_, O>, scored: &Scored) -> Vec<Vec<f64>> {
     let candidate = at.candidate(scored);
     let starts = in_each_form(candidate, scored).flat_map(|form| aside(candidate, &form, &WITHOUT_A_SLOPE));
     let ripples = candidate.is_searched(Search::Periodic);
@@ -116,7 +117,7 @@ fn scanned<E: Likelihood>(at: &Around<'_, E>, scored: &Scored) -> Vec<Vec<f64>> 
 }
 
 /// Numbers of an effect to which no slope leads, joint by joint.
-fn without_a_slope<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate) -> Vec<Vec<f64>> {
+fn without_a_slope<O: OwnNumbers>(at: &Around<'_, O>, candidate: &Candidate) -> Vec<Vec<f64>> {
     if candidate.is_searched(Search::Limit) {
         // Where an arm is driven into its limits, gains that were fitted without these mean nothing.
         let nominal = with_nominal(at, |k| at.bench.library.joints[k].is_some());
@@ -128,7 +129,7 @@ fn without_a_slope<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate) -> 
 
 /// Limits of joints, each time that of the joint where the clips then cost least, for as long as that spares something: until the
 /// worst is limited, those of the others mean nothing.
-fn limits<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate, mut full: Vec<f64>) -> Vec<f64> {
+fn limits<O: OwnNumbers>(at: &Around<'_, O>, candidate: &Candidate, mut full: Vec<f64>) -> Vec<f64> {
     let moves: Vec<(usize, f64)> = first_moves(candidate).collect();
     let mut cost = at.cost(&full);
     for _ in &candidate.sizes {
@@ -146,7 +147,7 @@ fn first_moves(candidate: &Candidate) -> impl Iterator<Item = (usize, f64)> {
 
 /// Sizes of an effect in the joints, one joint after the other, where the clips cost least once the gains of that joint are fitted
 /// beside it: gains that were fitted without the effect stand in for it. In joints that leave no gap it explains nothing.
-fn joint_by_joint<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate) -> Vec<f64> {
+fn joint_by_joint<O: OwnNumbers>(at: &Around<'_, O>, candidate: &Candidate) -> Vec<f64> {
     let (library, mut full) = (at.bench.library, at.from.full.clone());
     let open = at.joints_with_a_gap();
     for probe in &candidate.alternatives[0].probes {
@@ -169,7 +170,7 @@ fn joint_by_joint<E: Likelihood>(at: &Around<'_, E>, candidate: &Candidate) -> V
 }
 
 /// The numbers with some of the baseline's as cell.toml has them.
-fn with_nominal<E: Likelihood>(at: &Around<'_, E>, which: impl Fn(usize) -> bool) -> Vec<f64> {
+fn with_nominal<O: OwnNumbers>(at: &Around<'_, O>, which: impl Fn(usize) -> bool) -> Vec<f64> {
     let (library, mut full) = (at.bench.library, at.from.full.clone());
     library.baseline.clone().filter(|k| which(*k)).for_each(|k| full[k] = library.unknowns[k].start);
     full
@@ -178,7 +179,7 @@ fn with_nominal<E: Likelihood>(at: &Around<'_, E>, which: impl Fn(usize) -> bool
 /// Some way to either side along each of a candidate's directions, in any of its forms: the numbers of those `count` places where the
 /// clips cost least. Also with the object as it is said to be: fitted without the effect, its numbers stand in
 /// for it, and would have to be unlearnt. But for its friction: how far it slides tells that whatever the hit was like.
-fn each_direction<E: Likelihood>(at: &Around<'_, E>, scored: &Scored, count: usize) -> Vec<Vec<f64>> {
+fn each_direction<O: OwnNumbers>(at: &Around<'_, O>, scored: &Scored, count: usize) -> Vec<Vec<f64>> {
     let alternatives = &at.candidate(scored).alternatives;
     let mut starts = Vec::new();
     for (alternative, form) in alternatives.iter().enumerate() {
@@ -200,8 +201,8 @@ fn each_direction<E: Likelihood>(at: &Around<'_, E>, scored: &Scored, count: usi
 /// Numbers of an effect in the joints that the arm's own channels leave open, where the object tells them: nothing but what
 /// the tip hits says how far off a vertical joint's encoder is. `full`: the others, as the arm tells them. One number after the other,
 /// where the clips cost least: from rest no slope leads there.
-pub(in crate::diagnose) fn seen_by_the_object<E: Likelihood>(
-    at: &Around<'_, E>,
+pub(in crate::diagnose) fn seen_by_the_object<O: OwnNumbers>(
+    at: &Around<'_, O>,
     mut full: Vec<f64>,
     open: &[usize],
 ) -> Vec<f64> {

@@ -10,12 +10,11 @@ use crate::diagnose::judge::trial::{Found, LARGE_SHARE_CLOSED, Step, Trial};
 use crate::diagnose::propose::Search;
 use crate::diagnose::propose::screening::MAX_FURTHER;
 use crate::diagnose::select::criteria::EFFECTS;
-use inference::likelihood::Evidence;
 
 /// The step with its best trial, fitted to the end, held against its nearest rivals once more, each with the object found anew under
 /// it: with an object that stands in for part of an effect a fit ends somewhere else than with the right one. What acts on the arm the
 /// arm's own channels tell apart, so there only those are rivals that still look alike.
-pub(super) fn rivals_refitted<E: Evidence>(search: &Search<'_, E>, step: Step, best: &Hypothesis) -> Step {
+pub(super) fn rivals_refitted(search: &Search<'_>, step: Step, best: &Hypothesis) -> Step {
     let bench = search.bench;
     let added = best.effects.last().and_then(|c| step.trials.iter().position(|t| t.scored.candidate == *c));
     let Some(added) = added.filter(|place| step.trials[*place].own_numbers) else { return step };
@@ -34,7 +33,7 @@ pub(super) fn rivals_refitted<E: Evidence>(search: &Search<'_, E>, step: Step, b
 
 /// Where no trial is worth it, those that close much of the gap are given the object anew before they are given up: what
 /// stands in for a part of them makes them uncertain.
-pub(super) fn reconsidered<E: Evidence>(search: &Search<'_, E>, step: Step) -> Step {
+pub(super) fn reconsidered(search: &Search<'_>, step: Step) -> Step {
     let bench = search.bench;
     if step.best(bench).is_some() || bench.scatter.count() == 0 {
         return step;
@@ -44,7 +43,7 @@ pub(super) fn reconsidered<E: Evidence>(search: &Search<'_, E>, step: Step) -> S
 }
 
 /// The step with the best of the trials that are `wanted` fitted again, with the object found anew under each.
-fn with_object_anew<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: impl Fn(usize, &Trial) -> bool) -> Step {
+fn with_object_anew(search: &Search<'_>, step: Step, wanted: impl Fn(usize, &Trial) -> bool) -> Step {
     let bench = search.bench;
     let mut places: Vec<usize> = (0..step.trials.len()).filter(|k| wanted(*k, &step.trials[*k])).collect();
     places.sort_by(|a, b| step.trials[*b].nats().total_cmp(&step.trials[*a].nats()));
@@ -61,7 +60,7 @@ fn with_object_anew<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: imp
 /// What a step extends, from the numbers of its best trial without that trial's effect, where it fits better by more than is near and by
 /// such a share of what the trial gains as a cause must close: fits with an effect get a start of their own each, and any effect seems
 /// to close what a worse place of the fit without leaves. Only clips with nuisance parameters are as rough as that.
-pub(super) fn without_the_best<E: Evidence>(search: &Search<'_, E>, step: &Step) -> Option<Hypothesis> {
+pub(super) fn without_the_best(search: &Search<'_>, step: &Step) -> Option<Hypothesis> {
     let bench = search.bench;
     if bench.scatter.count() == 0 || bench.interrupt.asked() {
         return None;
@@ -77,7 +76,7 @@ pub(super) fn without_the_best<E: Evidence>(search: &Search<'_, E>, step: &Step)
 
 /// A hypothesis at its best by another program that simulates; as it is where the twin does, where that program has no answer, or no time
 /// is left.
-pub(super) fn by_engine<E: Evidence>(search: &Search<'_, E>, fit: Hypothesis, weights: &[f64]) -> Hypothesis {
+pub(super) fn by_engine(search: &Search<'_>, fit: Hypothesis, weights: &[f64]) -> Hypothesis {
     if search.bench.evidence.engine().is_none() || search.bench.interrupt.asked() {
         return fit;
     }
@@ -85,7 +84,7 @@ pub(super) fn by_engine<E: Evidence>(search: &Search<'_, E>, fit: Hypothesis, we
 }
 
 /// What was found, baseline and result at their best by the engine. The baseline is fitted once more from where the result ended.
-pub(super) fn found_by_engine<E: Evidence>(search: &Search<'_, E>, mut found: Found) -> Found {
+pub(super) fn found_by_engine(search: &Search<'_>, mut found: Found) -> Found {
     if search.bench.evidence.engine().is_none() || search.bench.interrupt.asked() {
         return found;
     }

@@ -15,9 +15,10 @@ use crate::diagnose::propose::arm_alone::ArmAlone;
 use inference::admit::{Admitted, Split};
 use inference::controller;
 use inference::kept::Kept;
+use inference::likelihood::Settings;
 use inference::likelihood::object::ObjectClips;
+use inference::likelihood::random_effects::OwnNumbers;
 use inference::likelihood::setting::{complete, object_parameters};
-use inference::likelihood::{Evidence, Likelihood, Settings};
 use inference::object_fit::fit_object;
 use inference::witness::{self, Witness};
 use shared_mem::cell::Cell;
@@ -31,14 +32,14 @@ pub fn steps(with_object: bool) -> u64 {
 }
 
 /// What the baseline of a session is identified from.
-pub struct Baseline<'a, E> {
-    pub bench: &'a Bench<'a, E>,
+pub struct Baseline<'a> {
+    pub bench: &'a Bench<'a>,
     pub split: &'a Split,
     pub cell: &'a Cell,
     pub admitted: &'a Admitted,
 }
 
-impl<E: Evidence> Baseline<'_, E> {
+impl Baseline<'_> {
     /// `None` when the twin has no answer at the nominal parameters.
     pub fn identified(&self, bar: &Progress) -> Option<Hypothesis> {
         let (bench, train) = (self.bench, &self.split.train[..]);
@@ -125,12 +126,12 @@ impl<E: Evidence> Baseline<'_, E> {
 }
 
 /// The arm by itself, from where its numbers begin.
-fn of_the_arm<E: Likelihood>(
-    bench: &Bench<'_, E>,
+fn of_the_arm<O: OwnNumbers>(
+    bench: &Bench<'_, O>,
     train: &[usize],
     start: Vec<f64>,
     bar: &Progress,
-) -> Option<Hypothesis<E::Own>> {
+) -> Option<Hypothesis<O>> {
     let even = floor::sensors_alone(bench.evidence);
     let on_the_way = bench.fit(&[], start, train, &even, None, THOROUGH)?;
     bar.show(1, stages::BASELINE);

@@ -22,7 +22,7 @@ use crate::diagnose::propose::starts;
 use crate::diagnose::propose::{Around, Search, arm_alone, signatures};
 use crate::diagnose::select::criteria::EFFECTS;
 use crate::diagnose::select::forward::{Selection, backward, forward};
-use inference::likelihood::{Evidence, Group, Row};
+use inference::likelihood::{Group, Row};
 use twin::effects::Stage;
 
 /// So often at most the steps of a search are begun anew from a better fit of what they extend (a choice).
@@ -33,7 +33,7 @@ const NEAR_SHARE: f64 = 0.4;
 const NUMERICS_OF_GAP: f64 = 1e-4;
 
 /// Searches from a baseline.
-pub(super) fn search<E: Evidence>(search: &Search<'_, E>, baseline: Hypothesis) -> Option<Found> {
+pub(super) fn search(search: &Search<'_>, baseline: Hypothesis) -> Option<Found> {
     let selected = forward(search, baseline)?;
     let around = Anchored::new(search.bench.evidence, &selected.last.full);
     let anchored = around.bench(search.bench);
@@ -49,7 +49,7 @@ pub(in crate::diagnose) struct Attempt {
     restarts: usize,
 }
 
-impl<E: Evidence> Selection for Search<'_, E> {
+impl Selection for Search<'_> {
     type Model = Hypothesis;
     type Step = Attempt;
 
@@ -94,7 +94,7 @@ impl<E: Evidence> Selection for Search<'_, E> {
 
 /// What a step extends with the best of its trials, both fitted to the end beside its nearest rivals; `None` as the second where none is
 /// worth it.
-fn extended<E: Evidence>(search: &Search<'_, E>, step: Step) -> Option<(Step, Option<Hypothesis>)> {
+fn extended(search: &Search<'_>, step: Step) -> Option<(Step, Option<Hypothesis>)> {
     let best = |step: &Step| step.best(search.bench).map(|(_, fit, _)| fit.clone());
     let Some(fit) = best(&step).filter(|_| step.from.effects.len() < EFFECTS.max_extensions) else {
         return Some((step, None));
@@ -118,7 +118,7 @@ fn extended<E: Evidence>(search: &Search<'_, E>, step: Step) -> Option<(Step, Op
 
 /// Whether the effects found so far leave no more than numerics do: a further one would only name how engines differ. The
 /// first effect is never held back by this.
-fn is_spent<E: Evidence>(search: &Search<'_, E>, first: &Step, now: &Hypothesis) -> bool {
+fn is_spent(search: &Search<'_>, first: &Step, now: &Hypothesis) -> bool {
     let typical =
         |hypothesis| Residuals::at(search.bench, hypothesis, search.split.elsewhere()).map(|left| left.typical());
     let (Some(before), Some(after)) = (typical(&first.from), typical(now)) else { return false };
@@ -130,11 +130,7 @@ fn is_spent<E: Evidence>(search: &Search<'_, E>, first: &Step, now: &Hypothesis)
 
 /// Sweeps around a hypothesis, scores all candidates, fits the best. `first`: the first step, where this is not the first; `worse`:
 /// candidates with which clips were predicted worse around a hypothesis that fitted less well than this one.
-fn tried<E: Evidence>(
-    search: &Search<'_, E>,
-    from: &Hypothesis,
-    (first, worse): (Option<&Step>, &[usize]),
-) -> Option<Step> {
+fn tried(search: &Search<'_>, from: &Hypothesis, (first, worse): (Option<&Step>, &[usize])) -> Option<Step> {
     let bench = search.bench;
     let (weights, mut scored, narrow) = signatures::around(bench, search.split, from, search.bar)?;
     let step = begun(search, from, weights, first)?;
@@ -169,18 +165,13 @@ fn tried<E: Evidence>(
 }
 
 /// A step in which nothing is tried: the hypothesis with the weights that it leaves itself.
-fn untried<E: Evidence>(search: &Search<'_, E>, now: &Hypothesis, first: Option<&Step>) -> Option<Step> {
+fn untried(search: &Search<'_>, now: &Hypothesis, first: Option<&Step>) -> Option<Step> {
     let left = Residuals::at(search.bench, now, &search.split.train)?;
     begun(search, now, floor::weights(search.bench.evidence, &left.clips), first)
 }
 
 /// A step before anything is tried. Under these weights the hypothesis may be printed, so what acts is fitted to the end again.
-fn begun<E: Evidence>(
-    search: &Search<'_, E>,
-    from: &Hypothesis,
-    weights: Vec<f64>,
-    first: Option<&Step>,
-) -> Option<Step> {
+fn begun(search: &Search<'_>, from: &Hypothesis, weights: Vec<f64>, first: Option<&Step>) -> Option<Step> {
     let (bench, split) = (search.bench, search.split);
     let effort = if from.effects.is_empty() { REFINEMENT } else { search.last_pass() };
     let from = search.onwards(from, &weights, effort)?;
@@ -194,7 +185,7 @@ fn begun<E: Evidence>(
 
 /// The step with candidates fitted and judged: all a little, those that come near the best to the end. `overlooked` says that the
 /// score test did not point to them.
-fn fitted<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: &[usize], overlooked: bool) -> Step {
+fn fitted(search: &Search<'_>, step: Step, wanted: &[usize], overlooked: bool) -> Step {
     let (bench, split) = (search.bench, search.split);
     let asked = (0..step.trials.len()).filter(|k| wanted.contains(&step.trials[*k].scored.candidate));
     let on_arm = |place: &usize| {
@@ -233,7 +224,7 @@ fn fitted<E: Evidence>(search: &Search<'_, E>, step: Step, wanted: &[usize], ove
 }
 
 /// A few steps of a candidate's fit, from wherever it may begin.
-fn a_little<E: Evidence>(search: &Search<'_, E>, step: &Step, place: usize, overlooked: bool) -> Option<Hypothesis> {
+fn a_little(search: &Search<'_>, step: &Step, place: usize, overlooked: bool) -> Option<Hypothesis> {
     let (bench, scored) = (search.bench, &step.trials[place].scored);
     let effects = [&step.from.effects[..], &[scored.candidate]].concat();
     let fits = search.fits(&effects, &step.weights, &step.from);

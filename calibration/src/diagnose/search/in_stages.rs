@@ -4,7 +4,6 @@
 use crate::diagnose::criteria::MOST_OF_IT;
 use crate::diagnose::judge::trial::Step;
 use crate::diagnose::propose::Search;
-use inference::likelihood::Evidence;
 use inference::witness::Witness;
 
 /// A candidate that single stages show beyond what is in the model.
@@ -15,7 +14,7 @@ pub(super) struct ShownInStages {
 }
 
 /// Candidates that single stages show beyond the effects in these numbers, and those that would show alike.
-pub(super) fn shown<E: Evidence>(search: &Search<'_, E>, full: &[f64]) -> Vec<ShownInStages> {
+pub(super) fn shown(search: &Search<'_>, full: &[f64]) -> Vec<ShownInStages> {
     let significant: Vec<Witness> = (search.witnessed)(full).into_iter().filter(Witness::is_significant).collect();
     let of = |candidate: usize| {
         let name = search.bench.library.name(candidate);
@@ -27,7 +26,7 @@ pub(super) fn shown<E: Evidence>(search: &Search<'_, E>, full: &[f64]) -> Vec<Sh
 }
 
 /// The step with what stages say of its trials.
-pub(super) fn compared<E: Evidence>(search: &Search<'_, E>, mut step: Step, shown: &[ShownInStages]) -> Step {
+pub(super) fn compared(search: &Search<'_>, mut step: Step, shown: &[ShownInStages]) -> Step {
     for ShownInStages { candidate, witnesses } in shown {
         let Some(trial) = step.trials.iter_mut().find(|trial| trial.scored.candidate == *candidate) else { continue };
         let Some((fit, _)) = &trial.fitted else { continue };

@@ -8,7 +8,6 @@ use crate::diagnose::library::Alternative;
 use crate::diagnose::propose::Search;
 use crate::diagnose::propose::arm_alone::ArmAlone;
 use crate::diagnose::select::criteria::EFFECTS;
-use inference::likelihood::Evidence;
 
 /// Where in its range a held form is tried, and how often the best of these is then looked for halfway to its neighbours (choices).
 const SHARES_OF_RANGE: [f64; 9] = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0];
@@ -16,7 +15,7 @@ const HALVINGS: usize = 5;
 
 /// A fit to the end, from where it is and from elsewhere: an effect frees the object's parameters from what they stood in
 /// for, so they are found anew under it, and under the other way in which it could act where there are two.
-pub(super) fn refitted<E: Evidence>(search: &Search<'_, E>, fit: &Hypothesis, weights: &[f64]) -> Option<Hypothesis> {
+pub(super) fn refitted(search: &Search<'_>, fit: &Hypothesis, weights: &[f64]) -> Option<Hypothesis> {
     let (bench, fits) = (search.bench, search.fits(&fit.effects, weights, fit));
     let ways = [Some(fit.full.clone()), other_way(bench, fit)];
     let anew = ways.iter().flatten().filter_map(|full| (search.refined)(full));
@@ -27,7 +26,7 @@ pub(super) fn refitted<E: Evidence>(search: &Search<'_, E>, fit: &Hypothesis, we
 
 /// The numbers of a fit whose last effect is one of the arm, with what is held of it where the arm's channels cost least, the
 /// same for all joints; `None` where that is where it was.
-fn scanned<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
+fn scanned(bench: &Bench<'_>, fit: &Hypothesis, weights: &[f64]) -> Option<Vec<f64>> {
     let candidate = &bench.library.candidates[*fit.effects.last()?];
     let held: Vec<usize> = candidate.numbers.clone().filter(|k| !candidate.turned.contains(k)).collect();
     if held.is_empty() || !candidate.is_of_arm() {
@@ -62,7 +61,7 @@ fn scanned<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis, weights: &[f64])
 }
 
 /// The numbers of a fit whose last effect has two forms, in the form that is further from what was fitted.
-fn other_way<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis) -> Option<Vec<f64>> {
+fn other_way(bench: &Bench<'_>, fit: &Hypothesis) -> Option<Vec<f64>> {
     let [one, two] = &bench.library.candidates[*fit.effects.last()?].alternatives[..] else { return None };
     let far = |form: &Alternative| form.form.iter().map(|(k, value)| (fit.full[*k] - value).abs()).sum::<f64>();
     let mut full = fit.full.clone();
@@ -72,7 +71,7 @@ fn other_way<E: Evidence>(bench: &Bench<'_, E>, fit: &Hypothesis) -> Option<Vec<
 }
 
 /// A hypothesis without the first of its effects that the others make superfluous.
-pub(super) fn fewer<E: Evidence>(search: &Search<'_, E>, now: &Hypothesis, weights: &[f64]) -> Option<Hypothesis> {
+pub(super) fn fewer(search: &Search<'_>, now: &Hypothesis, weights: &[f64]) -> Option<Hypothesis> {
     let bench = search.bench;
     if now.effects.len() < 2 || bench.interrupt.asked() {
         return None;
