@@ -4,7 +4,11 @@ from the truth, beside Open3D's fusion (of objects with screened Poisson reconst
     python3 -m venv scan_venv
     scan_venv/bin/pip install mujoco==4.0.0 numpy==2.4.6 scipy trimesh==5.2.0 manifold3d==3.5.4 pillow open3d==0.20.0
     scan_venv/bin/python tests/peers/scan.py --program target/release/twin --out scans --objects box mug
+    scan_venv/bin/python tests/peers/scan.py --program target/release/twin --out scans --kinds depth masks exact
     scan_venv/bin/python tests/peers/scan.py --program target/release/twin --out scans --rooms 1 --views 60
+
+MUJOCO_GL=osmesa draws where there is no EGL. Scans are from above a table, as people take them, but for the kinds depth, masks and exact, in
+which the object floats and is seen from all sides.
 
 Licences: mujoco and scipy Apache-2.0 and BSD, trimesh and open3d MIT, manifold3d Apache-2.0, pillow MIT-CMU.
 """
@@ -27,6 +31,9 @@ SAMPLES = 60_000
 # Pixels of the object's rim that show what is behind it.
 RIM = 3
 KINDS = {
+    "above": {"noise": True, "depth": True, "above": True},
+    "above_masks": {"noise": True, "depth": False, "above": True},
+    "above_table": {"noise": True, "depth": False, "above": True, "table": True},
     "depth": {"noise": True, "depth": True},
     "masks": {"noise": True, "depth": False},
     "exact": {"noise": False, "depth": True},
@@ -109,8 +116,8 @@ def open3d_mesh(folder, voxel=0.001):
     return max(parts, key=lambda part: len(part.faces)) if len(parts) else mesh
 
 
-def reconstruct(program, folder, out, kind):
-    command = [program, "reconstruct", "object", folder, "--out", out, "--json", "--force"]
+def reconstruct(program, folder, out, kind, grid):
+    command = [program, "reconstruct", "object", folder, "--out", out, "--json", "--force", "--grid", str(grid)]
     command += ["--scale", "1"] if not KINDS[kind]["depth"] else []
     begun = os.times()
     ended = subprocess.run(command, capture_output=True, text=True)
@@ -124,10 +131,10 @@ def reconstruct(program, folder, out, kind):
 
 def judged(args, name, truth, kind):
     folder, out = f"{args.out}/{name}_{kind}", f"{args.out}/{name}_{kind}_object"
-    answer = reconstruct(args.program, folder, out, kind)
+    answer = reconstruct(args.program, folder, out, kind, args.grid)
     if "error" in answer:
         return answer
-    row = {key: answer[key] for key in ("psnr_db", "seconds", "cpu_seconds", "cameras_moved_m", "remarks")}
+    row = {key: answer[key] for key in ("psnr_db", "seconds", "cpu_seconds", "cameras_moved_m", "voxel_m", "remarks")}
     for which in ("object_fine", "object"):
         mesh = trimesh.load(f"{out}/{which}.obj", process=False)
         mesh.apply_translation(answer["origin_in_scan_m"])
@@ -147,7 +154,7 @@ def line(name, kind, row):
     volume = f"{100 * fine['volume']:+.1f} %" if fine["volume"] is not None else "open"
     other = f"{peer['chamfer_mm']:.2f}" if peer else "-"
     return (
-        f"| {name} | {kind} | {fine['chamfer_mm']:.2f} | {other} | {volume} | {fine['genus']} of {shapes.GENUS[name]} "
+        f"| {name} | {kind} | {1e3 * row['voxel_m']:.2f} | {fine['chamfer_mm']:.2f} | {other} | {volume} | {fine['genus']} of {shapes.GENUS[name]} "
         f"| {row['true_mask_psnr_db']:.1f} | {row['true_mask_splats_db']:.1f} | {row['seconds']:.0f} ({row['cpu_seconds']:.0f} CPU) |"
     )
 
@@ -206,12 +213,25 @@ def all_rooms(args):
             json.dump(rows, out, indent=1)
 
 
+def drawn_anew(truth, path, kinds, views):
+    """Draws an object once from above and once from all sides, as far as the kinds need it, and writes their scans."""
+    from scan_objects.record import record, shots
+
+    for above in (True, False):
+        wanted = [kind for kind in kinds if KINDS[kind].get("above", False) == above]
+        drawn = shots(truth, f"{path}_world", above, views=views) if wanted else []
+        for kind in wanted:
+            table = float(truth.bounds[0][2]) if KINDS[kind].get("table") else None
+            record(drawn, f"{path}_{kind}", noise=KINDS[kind]["noise"], depth=KINDS[kind]["depth"], table=table)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="target/release/twin", help="the program twin")
     parser.add_argument("--out", required=True, help="folder for scans and results; scans that are there are kept")
     parser.add_argument("--objects", nargs="+", choices=list(shapes.GENUS), default=list(shapes.GENUS))
-    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=[kind for kind in KINDS if KINDS[kind].get("above")])
+    parser.add_argument("--grid", type=int, default=128, help="nodes along each edge of an object's grid")
     parser.add_argument("--views", type=int, default=60)
     parser.add_argument("--rooms", type=int, default=0, help="so many rooms in place of objects")
     parser.add_argument("--steps", type=int, default=1500, help="of the training of a room's splats")
@@ -221,18 +241,14 @@ def main():
         all_rooms(args)
         return
     rows = {}
-    print("| object | input | Chamfer-L1 [mm] | Open3D | volume | genus | held-out PSNR [dB] | splats [dB] | time [s] |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("| object | input | voxel [mm] | Chamfer-L1 [mm] | Open3D | volume | genus | held-out PSNR [dB] | splats [dB] | time [s] |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
     for name, truth in shapes.objects():
         if name not in args.objects:
             continue
         missing = [kind for kind in args.kinds if not os.path.exists(f"{args.out}/{name}_{kind}/transforms.json")]
         if missing:
-            from scan_objects.record import record, shots
-
-            drawn = shots(truth, f"{args.out}/{name}_world", views=args.views)
-            for kind in missing:
-                record(drawn, f"{args.out}/{name}_{kind}", **KINDS[kind])
+            drawn_anew(truth, f"{args.out}/{name}", missing, args.views)
         for kind in args.kinds:
             begun = time.time()
             rows[f"{name} {kind}"] = row = judged(args, name, truth, kind)

@@ -1,4 +1,5 @@
-"""Scans of an object drawn by MuJoCo: pictures, masks, depth and poses, with the noise of a real camera or none."""
+"""Scans of an object drawn by MuJoCo: pictures, masks, depth and poses, with the noise of a real camera or none. From above, as people
+take them: the object on a table under a lamp whose shadow falls, nothing from below. Around: the object in the air, from all sides."""
 
 import json
 import os
@@ -15,6 +16,11 @@ from scan_objects.shapes import paint, unfolded
 
 WIDTH, HEIGHT, FOCAL = 640, 480, 600.0
 HOLD_OUT = 8
+# Rounds of a scan from above [degrees over the table]; the object's longest edge fills this share of the picture's width.
+ROUNDS = (14.0, 36.0, 62.0)
+FILLS = 0.5
+# Group of the table, which is hidden where the mask is drawn.
+TABLE = 3
 
 
 def _obj(path, mesh):
@@ -33,24 +39,38 @@ def _atlas(rng):
     return np.concatenate(rows, axis=0)
 
 
-def world(mesh, folder, rng):
-    """The object under three fixed lights, nothing that shines."""
+def _lights(above):
+    """Three fixed lights, of which the first is a lamp that casts shadows where there is a table."""
+    return f"""<light directional="true" dir="-.4 .5 -1" diffuse=".45 .45 .45" specular="0 0 0" castshadow="{str(above).lower()}"/>
+        <light directional="true" dir=".6 -.3 {'-.5' if above else '.5'}" diffuse=".3 .3 .3" specular="0 0 0" castshadow="false"/>
+        <light directional="true" dir=".2 -.8 -.3" diffuse=".2 .2 .2" specular="0 0 0" castshadow="false"/>"""
+
+
+def _table(height):
+    """A printed board of 1 m whose top is so high."""
+    return f"""<geom type="box" size=".5 .5 .01" pos="0 0 {height - 0.01}" group="{TABLE}" material="board"/>"""
+
+
+def world(mesh, folder, rng, above):
+    """The object under three fixed lights, nothing that shines; seen from above on a table."""
     os.makedirs(folder, exist_ok=True)
     _obj(f"{folder}/object.obj", mesh)
     Image.fromarray(_atlas(rng)).save(f"{folder}/paint.png")
+    Image.fromarray(paint(rng, 1024)).save(f"{folder}/board.png")
     text = f"""<mujoco>
       <compiler meshdir="{folder}" texturedir="{folder}"/>
       <visual><headlight ambient=".35 .35 .35" diffuse="0 0 0" specular="0 0 0"/>
-        <global offwidth="{WIDTH}" offheight="{HEIGHT}"/><quality offsamples="8" shadowsize="0"/>
+        <global offwidth="{WIDTH}" offheight="{HEIGHT}"/><quality offsamples="8" shadowsize="{4096 if above else 0}"/>
         <map znear="0.005" zfar="5"/></visual>
+      {'<statistic extent="0.5" center="0 0 0"/>' if above else ""}
       <asset><mesh name="m" file="object.obj" inertia="shell"/>
         <texture name="t" type="2d" file="paint.png"/>
         <material name="p" texture="t" specular="0" shininess="0"/>
+        <texture name="board" type="2d" file="board.png"/><material name="board" texture="board" specular="0" shininess="0"/>
         <texture type="skybox" builtin="flat" rgb1=".45 .5 .42" rgb2=".45 .5 .42" width="8" height="8"/></asset>
       <worldbody>
-        <light directional="true" dir="-.4 .5 -1" diffuse=".45 .45 .45" specular="0 0 0" castshadow="false"/>
-        <light directional="true" dir=".6 -.3 .5" diffuse=".3 .3 .3" specular="0 0 0" castshadow="false"/>
-        <light directional="true" dir=".2 -.8 -.3" diffuse=".2 .2 .2" specular="0 0 0" castshadow="false"/>
+        {_lights(above)}
+        {_table(mesh.bounds[0][2]) if above else ""}
         <body><geom type="mesh" mesh="m" material="p"/></body>
         <camera name="c" mode="fixed" resolution="{WIDTH} {HEIGHT}" focalpixel="{FOCAL} {FOCAL}"
           sensorsize="{WIDTH * 1e-5} {HEIGHT * 1e-5}"/>
@@ -58,21 +78,34 @@ def world(mesh, folder, rng):
     return mujoco.MjModel.from_xml_string(text)
 
 
-def cameras(mesh, count):
-    """Camera to world (x right, y down, z forwards), all around, the object filling two thirds of the picture."""
+def _looking(at):
+    """Camera to world (x right, y down, z forwards) of a camera at a place that looks at the origin."""
+    forwards = -at / np.linalg.norm(at)
+    right = np.cross(forwards, [0, 0, 1])
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([right, np.cross(forwards, right), forwards], axis=1)
+    pose[:3, 3] = at
+    return pose
+
+
+def around(mesh, count):
+    """From all sides, the object filling two thirds of the picture."""
     away = max(0.30, FOCAL * np.linalg.norm(mesh.extents) / (0.85 * HEIGHT))
     for i in range(count):
         height = 0.95 - 1.75 * (i + 0.5) / count
         turn = i * 2.399963
         across = np.sqrt(1 - height * height)
-        at = away * np.array([across * np.cos(turn), across * np.sin(turn), height])
-        forwards = -at / np.linalg.norm(at)
-        right = np.cross(forwards, [0, 0, 1])
-        right /= np.linalg.norm(right)
-        pose = np.eye(4)
-        pose[:3, :3] = np.stack([right, np.cross(forwards, right), forwards], axis=1)
-        pose[:3, 3] = at
-        yield pose
+        yield _looking(away * np.array([across * np.cos(turn), across * np.sin(turn), height]))
+
+
+def from_above(mesh, count):
+    """In rounds over the table, the object filling half of the picture, nothing from below."""
+    away = FOCAL * mesh.extents.max() / (FILLS * WIDTH)
+    for i in range(count):
+        high = np.radians(ROUNDS[i * len(ROUNDS) // count])
+        turn = 2 * np.pi * i * len(ROUNDS) / count + 0.3 * high
+        yield _looking(away * np.array([np.cos(high) * np.cos(turn), np.cos(high) * np.sin(turn), np.sin(high)]))
 
 
 def draw(model, pose, renderers):
@@ -83,12 +116,16 @@ def draw(model, pose, renderers):
     model.cam_pos[0], model.cam_quat[0] = pose[:3, 3], turn[[3, 0, 1, 2]]
     mujoco.mj_forward(model, data)
     colour, depth = renderers
-    colour.update_scene(data, "c")
-    depth.update_scene(data, "c")
-    z = depth.render().astype(float)
+    everything, alone = mujoco.MjvOption(), mujoco.MjvOption()
+    everything.geomgroup[TABLE], alone.geomgroup[TABLE] = 1, 0
     # What shows nothing lies at the far plane, which is given in units of the model's extent.
-    mask = z < 0.95 * model.vis.map.zfar * model.stat.extent
-    return colour.render().copy(), np.where(mask, z, 0.0), mask
+    farthest = 0.95 * model.vis.map.zfar * model.stat.extent
+    depth.update_scene(data, "c", scene_option=alone)
+    mask = depth.render() < farthest
+    depth.update_scene(data, "c", scene_option=everything)
+    z = depth.render().astype(float)
+    colour.update_scene(data, "c", scene_option=everything)
+    return colour.render().copy(), np.where(z < farthest, z, 0.0), mask
 
 
 def _wrong_mask(mask, rng, pixels):
@@ -105,19 +142,20 @@ def _wrong_pose(pose, rng, metres, degrees):
     return out
 
 
-def shots(mesh, folder, seed=1, views=60):
-    """The object from all sides, without any noise: colour, depth, mask and pose of each view."""
-    model = world(mesh, folder, np.random.default_rng(seed))
+def shots(mesh, folder, above, seed=1, views=60):
+    """The object from above or from all sides, without any noise: colour, depth, mask and pose of each view."""
+    model = world(mesh, folder, np.random.default_rng(seed), above)
     renderers = [mujoco.Renderer(model, HEIGHT, WIDTH) for _ in range(2)]
     renderers[1].enable_depth_rendering()
-    drawn = [(*draw(model, pose, renderers), pose) for pose in cameras(mesh, views)]
+    drawn = [(*draw(model, pose, renderers), pose) for pose in (from_above if above else around)(mesh, views)]
     for renderer in renderers:
         renderer.close()
     return drawn
 
 
-def record(drawn, folder, seed=1, noise=True, depth=True):
-    """Writes transforms.json, images, masks, depth (PNG, mm); in truth/ the exact masks of the held-out views and all poses."""
+def record(drawn, folder, seed=1, noise=True, depth=True, table=None):
+    """Writes transforms.json, images, masks, depth (PNG, mm); in truth/ the exact masks of the held-out views and all poses. `table`:
+    height of the table, where the scan says it [m]."""
     rng = np.random.default_rng(seed)
     for part in ("images", "masks", "truth") + (("depth",) if depth else ()):
         os.makedirs(f"{folder}/{part}", exist_ok=True)
@@ -131,7 +169,7 @@ def record(drawn, folder, seed=1, noise=True, depth=True):
         if depth:
             unit = 1e-3 if noise else 1e-4
             measured = z + (rng.standard_normal(z.shape) * 0.005 * z * z if noise else 0)
-            counts = np.where(mask, np.round(measured / unit), 0).astype(np.uint16)
+            counts = np.where(z > 0, np.round(measured / unit), 0).astype(np.uint16)
             Image.fromarray(counts).save(f"{folder}/depth/{name}")
             frame["depth_file_path"] = f"depth/{name}"
         frame["transform_matrix"] = (given @ np.diag([1.0, -1, -1, 1])).tolist()
@@ -142,6 +180,8 @@ def record(drawn, folder, seed=1, noise=True, depth=True):
     scan = {"camera_model": "PINHOLE", **camera, "frames": frames}
     if depth and not noise:
         scan["depth_unit_scale_factor"] = 1e-4
+    if table is not None:
+        scan["table"] = table
     with open(f"{folder}/transforms.json", "w") as out:
         json.dump(scan, out, indent=1)
     with open(f"{folder}/truth/poses.json", "w") as out:
