@@ -146,7 +146,7 @@ fn a_ring_comes_out_of_its_pictures_closed_with_its_hole_its_volume_and_its_colo
     write(folder.path(), Poses::Right);
     let scan = Scan::open(folder.path()).expect("a scan");
     let kept = folder.path().join("ring.state");
-    let object = reconstruct(scan, &Options { scale: None, edge: 32 }, &kept).expect("an object");
+    let object = reconstruct(scan, &Options { scale: None, edge: 32, table: None }, &kept).expect("an object");
     assert_eq!((object.topology.genus, object.topology.parts, object.held_out.len()), (1, 1, 3));
     let (truth, _) = surface(&ring()).expect("a ring");
     let volume = Solid::of(&object.fine).volume / Solid::of(&truth).volume;
@@ -201,7 +201,7 @@ const SCAN: &str = "TWINALIGN_TEST_SCAN";
 const ENDS: &str = "TWINALIGN_TEST_ENDS";
 /// What it said in the end.
 const SAID: &str = "said";
-const COARSE: Options = Options { scale: None, edge: 24 };
+const COARSE: Options = Options { scale: None, edge: 24, table: None };
 
 #[test]
 fn a_run_that_is_ended_again_and_again_goes_on_to_the_same_bytes() {
@@ -281,7 +281,7 @@ fn scans_that_cannot_be_used_are_refused_in_a_line_that_says_what_is_missing() {
     write(folder.path(), Poses::Right);
     let refused = |path: &Path, scale: Option<f64>| {
         let found = Scan::open(path).map_err(|error| error.to_string());
-        let options = Options { scale, edge: 24 };
+        let options = Options { scale, edge: 24, table: None };
         let made = found
             .and_then(|scan| reconstruct(scan, &options, &path.join("x.state")).map_err(|error| error.to_string()));
         let Err(line) = made else { panic!("it cannot be used") };

@@ -163,7 +163,8 @@ impl ArticulatedVerb {
         let mut state = self.outputs.out.as_os_str().to_owned();
         state.push(format!(".{which}"));
         let state = kept(Path::new(&state));
-        let object = object::reconstruct(Scan::open(path)?, &Options { scale: self.scale, edge: GRID }, &state)?;
+        let object =
+            object::reconstruct(Scan::open(path)?, &Options { scale: self.scale, edge: GRID, table: None }, &state)?;
         let middle = object.middle();
         Ok(Given {
             mesh: assets::centred(&object.fine, &middle),

@@ -8,9 +8,9 @@ use nalgebra::Point3;
 use reconstruct::assets::{self, Labels};
 use reconstruct::mesh::Mesh;
 use reconstruct::object::{self, Object, Options};
-use reconstruct::scan::Scan;
+use reconstruct::scan::{Scan, Table};
 use reconstruct::scene;
-use shared_mem::quantity::number;
+use shared_mem::quantity::{number, numbers};
 use shared_mem::{answer, console, ending};
 use std::path::{Path, PathBuf};
 
@@ -42,6 +42,11 @@ transforms.json of nerfstudio, a COLMAP model in sparse/0, or poses.json of a ro
 (depth/NAME.png, 16 bits, millimetres) make hollows and thin walls right, and give the scale. Forty to eighty pictures from all
 around, above and below are good; every eighth is held out and shows in the report how good the result is.
 
+Of an object on a table no picture shows the underside: it is closed in the plane of the table, and that is said to be a guess. Depth
+around the object says where the table is, or COLMAP's points, else --table, in the frame and the unit of the poses: with z up its
+height, and in any other frame NX,NY,NZ,D, the points x, y, z with NX x + NY y + NZ z = D, the normal from the table to the object. The
+key `table` of the poses' file says the same. Without any of these the underside is a tip, on which the object cannot stand.
+
 Writes object.obj (at most 700 triangles), object_fine.obj, object.ply (with colours; grey where no picture shows it), splats.ply
 (Gaussian splats on its surface), pieces/, object.urdf, cell_object.toml (an [object] block for cell.toml), object.json and
 report.html. After Ctrl-C the same command goes on.
@@ -49,6 +54,8 @@ report.html. After Ctrl-C the same command goes on.
 Examples:
   twin reconstruct object scan --out mug
   twin reconstruct object scan --out mug --mass 0.118
+  twin reconstruct object phone_scan --scale 0.0231 --table -1.35 --out mug
+  twin reconstruct object phone_scan --scale 0.0231 --table 0,-1,0,0.82 --out mug
   twin reconstruct object scan --out mug --dataset
   twin reconstruct object phone_scan --scale 0.0231 --out box --json")]
 pub(crate) struct ObjectVerb {
@@ -62,6 +69,10 @@ pub(crate) struct ObjectVerb {
     /// Metres for one unit of the poses, 1e-6 to 1000 [default: as depth or the robot says]
     #[arg(long, value_name = "METRES", value_parser = metres)]
     scale: Option<f64>,
+    /// The plane on which the object stands, in the frame and the unit of the poses: its height along z, or NX,NY,NZ,D: its normal,
+    /// up to the object, and its distance from the origin along it [default: as the scan, depth or COLMAP's points say]
+    #[arg(long, value_name = "PLANE", allow_hyphen_values = true, value_parser = table)]
+    table: Option<Table>,
     /// Nodes along each edge of the grid, were it a cube, 24 to 256: 256 takes eight times as long and 1.5 GB
     #[arg(long, value_name = "NODES", default_value_t = 128, value_parser = clap::value_parser!(u32).range(24..=256))]
     grid: u32,
@@ -116,6 +127,16 @@ pub(crate) struct SceneVerb {
 
 fn voxel(text: &str) -> Result<f64, String> {
     number(text, 1e-3..=0.05, "m")
+}
+
+fn table(text: &str) -> Result<Table, String> {
+    const FARTHEST: f64 = 1e6;
+    let said = if text.contains(',') {
+        numbers::<4>(text, -FARTHEST..=FARTHEST, "").ok().and_then(Table::plane)
+    } else {
+        number(text, -FARTHEST..=FARTHEST, "").ok().map(Table::at_height)
+    };
+    said.ok_or_else(|| "give its height along z, or nx,ny,nz,d of a plane, of which nx, ny and nz are not all 0".into())
 }
 
 impl SceneVerb {
@@ -179,7 +200,8 @@ impl ObjectVerb {
         let folder = self.outputs.folder(LAST_OF_OBJECT)?;
         let scan = Scan::open(&self.scan)?;
         let kept = kept(&self.outputs.out);
-        let object = object::reconstruct(scan, &Options { scale: self.scale, edge: self.grid }, &kept)?;
+        let object =
+            object::reconstruct(scan, &Options { scale: self.scale, edge: self.grid, table: self.table }, &kept)?;
         let middle = object.middle();
         let fine = assets::centred(&object.fine, &middle);
         let pieces: Vec<Mesh> = convex_pieces(&fine.points, &fine.triangles).into_iter().map(piece).collect();
@@ -208,8 +230,11 @@ impl ObjectVerb {
     fn words(&self, object: &Object, pieces: usize) -> String {
         let (low, high) = object.fine.bounds();
         let size = (high - low) * 1e3;
+        let base = object.support.map_or(String::new(), |support| {
+            format!(" (its base, which no picture shows, closed in the plane of the table: {})", support.source.words())
+        });
         format!(
-            "{}: {:.0} x {:.0} x {:.0} mm, {:.1} cm^3, closed, genus {}, {} convex pieces; held-out views {:.1} dB inside the mask, \
+            "{}: {:.0} x {:.0} x {:.0} mm, {:.1} cm^3, closed{base}, genus {}, {} convex pieces; held-out views {:.1} dB inside the mask, \
              {:.1} dB by {} splats; see {}",
             self.outputs.out.display(),
             size.x,

@@ -61,6 +61,7 @@ pub(super) fn block(summary: &Summary) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::summary::UnknownNumbers;
     use super::*;
     use crate::mesh::Topology;
     use crate::scan::{Scale, ScaleSource};
@@ -89,6 +90,8 @@ mod tests {
             psnr_db: 33.0,
             psnr_splats_db: 35.0,
             voxel_m: 1e-3,
+            table: None,
+            unknown: UnknownNumbers { unseen: 0.0, contradicted: 0.0, ambiguous: 0.0 },
             remarks: Vec::new(),
         }
     }

@@ -32,14 +32,14 @@ use description::escaped;
 use stems::stems;
 
 use crate::mesh::{Mesh, obj, ply};
-use crate::object::{Object, is_certain};
+use crate::object::{Certainty, Object};
 use nalgebra::{Point3, Similarity3, Vector3};
 use shared_mem::msg::image::PixelEncoding;
 use shared_mem::recording::pack_picture;
 use splat::SplatCloud;
 use std::path::PathBuf;
 
-/// Colour of what no view has shown, or of which views contradict each other.
+/// Colour of what is not known.
 const UNKNOWN: [u8; 3] = [128, 128, 128];
 /// Density where nobody weighed the object [kg/m³]: that of a filled package.
 pub const DENSITY: f64 = 500.0;
@@ -97,7 +97,7 @@ pub fn files(object: &Object, pieces: &[Mesh], labels: &Labels) -> Vec<(PathBuf,
 
 /// Of a corner of the fine mesh; grey where it is a guess.
 fn colour(object: &Object, corner: usize) -> [u8; 3] {
-    let is_known = is_certain(object.shown[corner]) && (object.with_depth || !object.contradicted[corner]);
+    let is_known = object.certainty[corner] == Certainty::Known;
     let known = object.field.colour_at(&object.fine.points[corner]).filter(|_| is_known);
     known.map_or(UNKNOWN, |colour| colour.map(|c| (c * 255.0).round() as u8))
 }

@@ -55,6 +55,22 @@ fn shape(summary: &Summary) -> Markup {
     };
     let [x, y, z] = summary.size_m.map(|edge| edge * 1e3);
     let mass = if summary.weighed { "weighed" } else { "from the volume at 500 kg/m³; weigh it and give --mass" };
+    let base = summary.table.map_or("as the outlines leave it: nothing says where the table is".to_owned(), |table| {
+        let [x, y, z] = table.normal;
+        let offset = table.offset_m * 1e3;
+        format!(
+            "closed in the plane of the table, a guess: {offset:.1} mm along ({x:.4}, {y:.4}, {z:.4}) from the scan's origin ({})",
+            table.source.words()
+        )
+    });
+    let share = |share: f64| format!("{:.1} %", 100.0 * share);
+    let unknown = format!(
+        "{} of the surface is shown by fewer than two views, on {} colours contradict each other, on {} they agree as well deeper (grey in \
+         object.ply)",
+        share(summary.unknown.unseen),
+        share(summary.unknown.contradicted),
+        share(summary.unknown.ambiguous)
+    );
     let rows = [
         (
             "surface",
@@ -64,6 +80,8 @@ fn shape(summary: &Summary) -> Markup {
             ),
         ),
         ("size", format!("{x:.1} x {y:.1} x {z:.1} mm along the scan's axes")),
+        ("base", base),
+        ("not known", unknown),
         (
             "convex pieces",
             format!("{}, {:.1} % of the volume", summary.pieces, 100.0 * summary.pieces_volume_m3 / summary.volume_m3),

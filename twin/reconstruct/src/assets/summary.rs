@@ -2,7 +2,7 @@
 
 use super::{DENSITY, Labels};
 use crate::mesh::{Mesh, Solid, Topology};
-use crate::object::Object;
+use crate::object::{Certainty, Object, TableSource};
 use crate::remark::Remark;
 use crate::scan::Scale;
 use serde::Serialize;
@@ -49,8 +49,33 @@ pub struct Summary {
     pub psnr_splats_db: f64,
     /// Distance of the grid's nodes [m].
     pub voxel_m: f64,
+    /// The table at which the base is closed, a guess; `None` where nothing says where it is.
+    pub table: Option<TableNumbers>,
+    /// Of the surface, what is not known.
+    pub unknown: UnknownNumbers,
     /// What a person should know.
     pub remarks: Vec<Remark>,
+}
+
+/// The plane under an object: the points p with `normal · p = offset_m`, in the scan's frame.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct TableNumbers {
+    /// Up, of length 1.
+    pub normal: [f64; 3],
+    /// Along it from the origin [m].
+    pub offset_m: f64,
+    pub source: TableSource,
+}
+
+/// Shares of the surface of which views do not say where it is [1]; `object.ply` has them in grey.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct UnknownNumbers {
+    /// Fewer than two views show it.
+    pub unseen: f64,
+    /// Their colours there contradict each other.
+    pub contradicted: f64,
+    /// Their colours agree as well two voxels deeper, and no outline shows it.
+    pub ambiguous: f64,
 }
 
 /// The numbers of one held-out view.
@@ -104,6 +129,16 @@ impl Summary {
             psnr_db: object.psnr(),
             psnr_splats_db: object.psnr_splats(),
             voxel_m: object.field.grid.voxel,
+            table: object.support.map(|support| TableNumbers {
+                normal: support.table.normal.into(),
+                offset_m: support.table.offset,
+                source: support.source,
+            }),
+            unknown: UnknownNumbers {
+                unseen: object.share(Certainty::Unseen),
+                contradicted: object.share(Certainty::Contradicted),
+                ambiguous: object.share(Certainty::Ambiguous),
+            },
             remarks: object.remarks.clone(),
         }
     }

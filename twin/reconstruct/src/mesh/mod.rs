@@ -53,6 +53,12 @@ impl Mesh {
         (low.into(), high.into())
     }
 
+    /// Middle of that box [m].
+    pub fn middle(&self) -> Point3<f64> {
+        let (low, high) = self.bounds();
+        nalgebra::center(&low, &high)
+    }
+
     /// The mesh without corners that no triangle has.
     pub(crate) fn compact(self, triangles: impl IntoIterator<Item = [u32; 3]>) -> Self {
         let mut number = vec![u32::MAX; self.points.len()];

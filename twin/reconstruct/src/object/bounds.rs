@@ -2,7 +2,8 @@
 
 use super::start::{self, Seen};
 use crate::field::Grid;
-use crate::scan::{Frame, ScanError};
+use crate::remark::Remark;
+use crate::scan::{Frame, ScanError, Table};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// Nodes of the coarse hull.
@@ -13,16 +14,90 @@ const FILLED: f64 = 0.8;
 /// masks even in mirrored poses.
 const PLAIN: f64 = 0.97;
 
-/// A box that holds the object [m].
+/// Shares of the views that must say whether a place is in their mask. Where pictures cut the object off, places beside the cameras are in
+/// the pictures of a few views alone, of which none has them outside of its mask. Of close-ups each shows a part: the share is halved
+/// for as long as the places that are left fill less of the masks than all do, by more than the last number.
+const SEEN_BY: [f64; 3] = [1.0 / 3.0, 1.0 / 6.0, 1.0 / 12.0];
+const UNFILLED: f64 = 0.02;
+/// A table cuts off the tip that no picture shows beneath an object, and by rounding to nodes some pixels more; one that takes more than
+/// this share of the masks away lies too high.
+const CUT: f64 = 0.05;
+/// What the outlines leave open beneath an object reaches below its table: one that lies deeper than this under all of it is another's
+/// [voxel of the coarse hull].
+const BENEATH: f64 = 2.0;
+
+/// Why an object does not stand on a table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Misplaced {
+    /// So much of what the masks show lies below it [1].
+    CutsOff(f64),
+    /// All of the object lies higher than this above it [m].
+    Beneath(f64),
+}
+
+/// A box that holds the object [m], and which places in it may be the object's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bounds {
     pub(crate) low: Point3<f64>,
     pub(crate) high: Point3<f64>,
+    /// Of places about which fewer views say something nothing is known.
+    pub(crate) fewest: usize,
+    /// Below it nothing is.
+    pub(crate) table: Option<Table>,
 }
 
 impl Bounds {
     pub(crate) fn centre(&self) -> Point3<f64> {
         nalgebra::center(&self.low, &self.high)
+    }
+
+    /// Half the diagonal [m].
+    pub(crate) fn radius(&self) -> f64 {
+        0.5 * (self.high - self.low).norm()
+    }
+
+    /// How far below the table a place is [m], negative above.
+    pub(crate) fn below(&self, point: &Point3<f64>) -> f64 {
+        self.table.map_or(f64::NEG_INFINITY, |table| -table.height(point))
+    }
+
+    /// The box of what stands on a table.
+    ///
+    /// # Errors
+    /// [`Misplaced`] where that cannot be.
+    pub(super) fn above(&self, frames: &[Frame], table: Table) -> Result<Self, Misplaced> {
+        let seen = Seen::all(frames, None);
+        let grid = Grid::filling(&self.low, &self.high, COARSE, 2);
+        let within = Self { table: Some(table), ..*self };
+        let (whole, rest) = (start::hull(&grid, &seen, self), start::hull(&grid, &seen, &within));
+        let inside = (0..grid.len()).filter(|node| whole[*node] < 0.0).map(|node| grid.position(grid.node(node)));
+        let lowest = inside.map(|place| table.height(&place)).fold(f64::INFINITY, f64::min);
+        if lowest > BENEATH * grid.voxel {
+            return Err(Misplaced::Beneath(lowest));
+        }
+        let lost = filled(frames, &grid, &whole) - filled(frames, &grid, &rest);
+        if lost > CUT {
+            return Err(Misplaced::CutsOff(lost));
+        }
+        within.around(&grid, &rest).ok_or(Misplaced::CutsOff(1.0))
+    }
+
+    /// What is to be said where less than a third of the views had to do.
+    pub(crate) fn remark(&self, views: usize) -> Option<Remark> {
+        (self.fewest < fewest(SEEN_BY[0], views)).then(|| {
+            Remark(format!(
+                "the views show parts of the object: of its places some are seen by fewer than a third of the {views} views, so those that {} \
+                 see count, too",
+                self.fewest
+            ))
+        })
+    }
+
+    /// With the box around the nodes inside, and room of a node.
+    fn around(&self, grid: &Grid, level: &[f32]) -> Option<Self> {
+        let (low, high) = start::bounds(grid, level)?;
+        let step = Vector3::repeat(grid.voxel);
+        Some(Self { low: low - step, high: high + step, ..*self })
     }
 }
 
@@ -41,21 +116,30 @@ pub(crate) fn find(frames: &[Frame]) -> Result<Bounds, ScanError> {
 fn fit(frames: &[Frame]) -> Option<(Bounds, f64)> {
     let (centre, radius) = sphere(frames)?;
     let seen = Seen::all(frames, None);
-    let around = |low: Point3<f64>, high: Point3<f64>| {
-        let grid = Grid::filling(&low, &high, COARSE, 2);
-        let level = start::hull(&grid, &seen);
-        (grid, level)
-    };
     let reach = Vector3::repeat(1.3 * radius);
-    let (grid, level) = around(centre - reach, centre + reach);
-    let (low, high) = start::bounds(&grid, &level)?;
+    let grid = Grid::filling(&(centre - reach), &(centre + reach), COARSE, 2);
+    let anywhere = Bounds { low: centre - reach, high: centre + reach, fewest: 1, table: None };
+    let (within, level) = seen_by_many(frames, &grid, &seen, &anywhere);
+    let within = within.around(&grid, &level)?;
     // Once more, with nodes where the object is.
-    let step = Vector3::repeat(grid.voxel);
-    let (grid, level) = around(low - step, high + step);
-    let (low, high) = start::bounds(&grid, &level)?;
-    let step = Vector3::repeat(grid.voxel);
+    let grid = Grid::filling(&within.low, &within.high, COARSE, 2);
+    let level = start::hull(&grid, &seen, &within);
     let filled = filled(frames, &grid, &level);
-    Some((Bounds { low: low - step, high: high + step }, filled))
+    Some((within.around(&grid, &level)?, filled))
+}
+
+/// So many of all views, one at least.
+fn fewest(share: f64, views: usize) -> usize {
+    ((share * views as f64).ceil() as usize).max(1)
+}
+
+/// The hull of the places that as many views see as may be asked for.
+fn seen_by_many(frames: &[Frame], grid: &Grid, seen: &[Seen<'_>], anywhere: &Bounds) -> (Bounds, Vec<f32>) {
+    let hull = |within: Bounds| (within, start::hull(grid, seen, &within));
+    let all = hull(*anywhere);
+    let least = filled(frames, grid, &all.1) - UNFILLED;
+    let mut stricter = SEEN_BY.iter().map(|share| hull(Bounds { fewest: fewest(*share, frames.len()), ..*anywhere }));
+    stricter.find(|(_, level)| filled(frames, grid, level) >= least).unwrap_or(all)
 }
 
 /// Sphere around the place that the masks' middles point to; `None` where the views' rays meet nowhere before them.
@@ -172,4 +256,73 @@ fn inconsistent(frames: &[Frame], filled: f64) -> ScanError {
         "the masks do not agree: what is inside all of them fills {share:.0} % of them; {}",
         guess(frames, FILLED.max(filled))
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::evidence::tests::{body, seen_from};
+    use super::*;
+
+    /// Rounds from above at these distances from the object's middle [m]; each camera looks past it by so much along its own x [m].
+    fn rounds(away: f64, aside: impl Fn(usize) -> f64) -> Vec<Frame> {
+        let pose = |number: usize| {
+            let (high, turn) = ([0.25f64, 0.63, 1.08][number % 3], number as f64 * 0.45);
+            let way = Vector3::new(high.cos() * turn.cos(), high.cos() * turn.sin(), high.sin());
+            let past = way.cross(&Vector3::z()).normalize() * aside(number);
+            Isometry3::face_towards(&Point3::from(way * away + past), &Point3::from(past), &-Vector3::z())
+        };
+        seen_from(&body(false), &(0..42).map(pose).collect::<Vec<_>>())
+    }
+
+    fn assert_around_the_body(bounds: &Bounds) {
+        // What the outlines leave open beneath it is a tip.
+        for (axis, half) in [0.04, 0.04, 0.03].into_iter().enumerate() {
+            let beneath = if axis == 2 { 0.02 } else { 0.0 };
+            let (low, high) = (-bounds.low[axis] - half, bounds.high[axis] - half);
+            assert!((0.0..0.008 + beneath).contains(&low) && (0.0..0.008).contains(&high), "{bounds:?}");
+        }
+    }
+
+    #[test]
+    fn an_object_that_fills_pictures_from_above_is_all_that_the_box_holds() {
+        let frames = rounds(0.25, |_| 0.0);
+        let bounds = find(&frames).expect("a box");
+        assert_around_the_body(&bounds);
+    }
+
+    #[test]
+    fn close_ups_of_parts_make_the_whole() {
+        // Ten views of the whole, and in the others a side of it: some of its places are seen by less than a third of all.
+        let aside = |number: usize| {
+            if number < 10 {
+                0.0
+            } else if number.is_multiple_of(2) {
+                0.06
+            } else {
+                -0.06
+            }
+        };
+        let frames = rounds(0.17, aside);
+        let bounds = find(&frames).expect("a box");
+        assert!(filled_by(&frames, &bounds) > 0.97, "{bounds:?}");
+    }
+
+    fn filled_by(frames: &[Frame], bounds: &Bounds) -> f64 {
+        let grid = Grid::filling(&bounds.low, &bounds.high, COARSE, 2);
+        filled(frames, &grid, &start::hull(&grid, &Seen::all(frames, None), bounds))
+    }
+
+    #[test]
+    fn a_table_ends_the_box_and_one_through_the_object_is_refused() {
+        let frames = rounds(0.25, |_| 0.0);
+        let bounds = find(&frames).expect("a box");
+        let above = bounds.above(&frames, Table::at_height(-0.03)).expect("above the table");
+        assert!((above.low.z + 0.03).abs() < 4e-3 && above.low.z > bounds.low.z, "{above:?} of {bounds:?}");
+        let through = bounds.above(&frames, Table::at_height(-0.015));
+        assert!(matches!(through, Err(Misplaced::CutsOff(share)) if (0.05..0.3).contains(&share)), "{through:?}");
+        let over = bounds.above(&frames, Table::at_height(0.2));
+        assert_eq!(over, Err(Misplaced::CutsOff(filled_by(&frames, &bounds))));
+        let beneath = bounds.above(&frames, Table::at_height(-0.08));
+        assert!(matches!(beneath, Err(Misplaced::Beneath(height)) if (0.02..0.05).contains(&height)), "{beneath:?}");
+    }
 }

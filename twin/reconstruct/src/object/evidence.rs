@@ -1,36 +1,61 @@
-//! What the views show of the surface: how many of them each corner of its mesh, and how far apart the colours are that they have there.
+//! What the views show of the surface: how many of them each corner of its mesh, and, without depth, whether they say where it is.
 //! Where the surface is not where it seems to be, as over a hollow that was filled because no silhouette shows it, each view sees another
-//! place.
+//! place, and their colours contradict each other; where it has no print, they are as alike behind it, and only an outline says where it
+//! is.
 
 use super::neighbours::Neighbours;
+use super::start::Seen;
+use super::stereo::Stereo;
 use super::view::draw;
 use crate::field::Field;
 use crate::mesh::Mesh;
 use crate::scan::{Camera, Frame};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
+use serde::Serialize;
 use shared_mem::statistics::median;
 
 /// Pictures of fewer pixels do.
 const COARSER: u32 = 3;
 /// A corner is shown by a view that it faces (cosine).
 const FACING: f64 = 0.25;
+/// A corner is seen that so many views show.
+pub(super) const SEEN: u8 = 2;
 /// Colours of fewer views say nothing about whether they agree.
 const MIN_VIEWS: usize = 3;
 /// Colours further apart contradict each other [of 255].
 const CONTRADICTORY: f64 = 16.0;
+/// Depths behind the surface that are compared with it, half a voxel apart: two voxels, over which pixels differ where there is a print.
+const TRIED: usize = 5;
+/// So near to a mask's border, seen from a view that it faces no more than by this cosine, an outline shows a corner [voxel].
+const OUTLINED: f64 = 1.5;
+const GRAZED: f64 = 0.3;
+
+/// Whether the views say where a corner of the surface is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Certainty {
+    /// They do.
+    Known,
+    /// Fewer than two show it.
+    Unseen,
+    /// Their colours there are of several places.
+    Contradicted,
+    /// Their colours are as alike, or more, up to two voxels behind it, and no outline shows it.
+    Ambiguous,
+}
 
 /// What views show of each corner.
 #[derive(Debug)]
 pub(super) struct Evidence {
     /// How many views show it.
     pub(super) views: Vec<u8>,
-    /// Whether they contradict each other about its colour.
-    pub(super) contradicted: Vec<bool>,
+    /// Whether they say where it is.
+    pub(super) certainty: Vec<Certainty>,
 }
 
 impl Evidence {
-    /// Of a mesh on the surface of `field`, from the poses that the frames have by now.
+    /// Of a mesh on the surface of `field`, from the poses that the frames have by now. Depth says where the surface is.
     pub(super) fn of(field: &Field<f32>, mesh: &Mesh, frames: &[Frame], poses: &[Isometry3<f64>]) -> Self {
         let normals = normals(mesh);
         let (mut views, mut colours) = (vec![0u8; mesh.points.len()], vec![Vec::new(); mesh.points.len()]);
@@ -40,22 +65,45 @@ impl Evidence {
                 colours[corner].extend(pixel.and_then(|pixel| mean(frame, pixel, COARSER)));
             }
         }
-        let apart = Neighbours::of(mesh).smoothed(colours.iter().map(|colours| apart(colours)).collect());
-        Self {
-            views,
-            contradicted: apart.into_iter().map(|apart| apart.is_some_and(|apart| apart > CONTRADICTORY)).collect(),
+        let seen = |corner: usize| if views[corner] < SEEN { Certainty::Unseen } else { Certainty::Known };
+        let mut certainty: Vec<Certainty> = (0..views.len()).map(seen).collect();
+        if frames.iter().all(|frame| frame.depth.is_empty()) {
+            let apart = Neighbours::of(mesh).smoothed(colours.iter().map(|colours| apart(colours)).collect());
+            let middle = mesh.middle();
+            let stereo = Stereo::new((frames, poses), (field.grid.voxel, &middle));
+            let ambiguous = stereo.ambiguous(field, mesh, TRIED);
+            let outlined = outlined((field, mesh, &normals), (frames, poses));
+            for (corner, certainty) in certainty.iter_mut().enumerate().filter(|(_, c)| **c == Certainty::Known) {
+                if apart[corner].is_some_and(|apart| apart > CONTRADICTORY) {
+                    *certainty = Certainty::Contradicted;
+                } else if ambiguous[corner] && !outlined[corner] {
+                    *certainty = Certainty::Ambiguous;
+                }
+            }
         }
+        Self { views, certainty }
     }
 
-    /// On which share of the mesh that it is of the views contradict each other [1].
-    pub(super) fn share_contradicted(&self, mesh: &Mesh) -> f64 {
-        share(mesh, |corner| self.contradicted[corner])
+    /// Which share of the mesh that it is of is so [1].
+    pub(super) fn share(&self, mesh: &Mesh, is: Certainty) -> f64 {
+        share(mesh, |corner| self.certainty[corner] == is)
     }
+}
 
-    /// On which share of the mesh fewer views than so many show a corner [1].
-    pub(super) fn share_shown_by_fewer(&self, mesh: &Mesh, views: u8) -> f64 {
-        share(mesh, |corner| self.views[corner] < views)
-    }
+/// Whether each corner of a mesh on the surface of a field lies in the outline of some view's mask.
+fn outlined(
+    (field, mesh, normals): (&Field<f32>, &Mesh, &[Vector3<f64>]),
+    (frames, poses): (&[Frame], &[Isometry3<f64>]),
+) -> Vec<bool> {
+    let seen = Seen::all(frames, Some(poses));
+    let near = OUTLINED * field.grid.voxel;
+    let is_outlined = |(point, normal): (&Point3<f64>, &Vector3<f64>)| {
+        seen.iter().zip(poses).any(|(seen, pose)| {
+            let towards = (Point3::from(pose.translation.vector) - point).normalize();
+            normal.dot(&towards).abs() < GRAZED && seen.outside(point).is_some_and(|away| away.abs() < near)
+        })
+    };
+    mesh.points.par_iter().zip(normals).map(is_outlined).collect()
 }
 
 /// Numbers of the views that show each corner of a mesh on the surface of a field, of which these are the normals.
@@ -69,7 +117,7 @@ pub(super) fn seen_by(
 }
 
 /// Share of the area of triangles with such a corner.
-fn share(mesh: &Mesh, is: impl Fn(usize) -> bool) -> f64 {
+pub(super) fn share(mesh: &Mesh, is: impl Fn(usize) -> bool) -> f64 {
     let (mut part, mut all) = (0.0, 0.0);
     for (number, triangle) in mesh.triangles.iter().enumerate() {
         let area = mesh.area(number);
@@ -152,8 +200,6 @@ pub(super) mod tests {
 
     /// Sixteen views from above of the box with its hollow.
     pub(in crate::object) fn scan() -> (Vec<Frame>, Vec<Isometry3<f64>>) {
-        let centre = [f64::from(WIDTH) / 2.0, f64::from(HEIGHT) / 2.0];
-        let camera = Camera { width: WIDTH, height: HEIGHT, focal: [180.0; 2], centre, lens: Distortion::NONE };
         let pose = |i: u32| {
             let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
             let high = 0.9 - 0.06 * f64::from(i);
@@ -161,13 +207,19 @@ pub(super) mod tests {
             Isometry3::face_towards(&eye, &Point3::origin(), &-Vector3::z())
         };
         let poses: Vec<_> = (0..16).map(pose).collect();
+        (seen_from(&body(true), &poses), poses)
+    }
+
+    /// Pictures and masks of a field.
+    pub(in crate::object) fn seen_from(field: &Field<f32>, poses: &[Isometry3<f64>]) -> Vec<Frame> {
+        let centre = [f64::from(WIDTH) / 2.0, f64::from(HEIGHT) / 2.0];
+        let camera = Camera { width: WIDTH, height: HEIGHT, focal: [180.0; 2], centre, lens: Distortion::NONE };
         let frame = |pose: &Isometry3<f64>| {
-            let drawn = draw(&body(true), &camera, pose);
+            let drawn = draw(field, &camera, pose);
             let mask = drawn.opacity.iter().map(|o| *o > 0.5).collect();
             Frame { name: String::new(), camera, scan_from_camera: *pose, rgb: drawn.rgb, mask, depth: Vec::new() }
         };
-        let frames: Vec<Frame> = poses.iter().map(frame).collect();
-        (frames, poses)
+        poses.iter().map(frame).collect()
     }
 
     /// A box of 80 x 80 x 60 mm, with a hollow of 60 x 60 x 40 mm that opens upwards or without.
@@ -191,10 +243,10 @@ pub(super) mod tests {
         let shares = |hollow: bool| {
             let field = body(hollow);
             let (mesh, _) = surface(&field).expect("a body");
-            let Evidence { views, contradicted } = Evidence::of(&field, &mesh, &frames, &poses);
+            let Evidence { views, certainty } = Evidence::of(&field, &mesh, &frames, &poses);
             let share = |counts: &dyn Fn(&Point3<f64>) -> bool| {
                 let all: Vec<usize> = (0..views.len()).filter(|i| counts(&mesh.points[*i]) && views[*i] > 3).collect();
-                all.iter().filter(|i| contradicted[**i]).count() as f64 / all.len() as f64
+                all.iter().filter(|i| certainty[**i] != Certainty::Known).count() as f64 / all.len() as f64
             };
             let over = |p: &Point3<f64>| p.z > 0.029 && p.x.abs() < 0.025 && p.y.abs() < 0.025;
             [share(&over), share(&|p| p.z < 0.02 && p.z > -0.025 && p.x.abs().max(p.y.abs()) > 0.038)]

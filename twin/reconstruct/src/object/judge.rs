@@ -1,15 +1,18 @@
 //! How good it is, by pictures that took no part; and what a person should know about the surface.
 
 use super::bounds::Bounds;
-use super::evidence::Evidence;
+use super::evidence::{Certainty, Evidence, SEEN};
 use super::learn;
 use super::pool;
+use super::table::Support;
 use super::view::{Drawn, draw};
+use super::walls::ThinWalls;
 use crate::field::{Field, Grid};
 use crate::mesh::{Islands, Mesh};
 use crate::remark::Remark;
 use crate::scan::Frame;
 use crate::splats;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use shared_mem::statistics::median;
 use splat::SplatCloud;
@@ -18,10 +21,16 @@ use splat::SplatCloud;
 const EDGE: i16 = 3;
 /// For depth that is expected, pictures of fewer pixels do.
 const COARSER: u32 = 6;
-/// A corner is certain that so many views show.
-const CERTAIN: u8 = 2;
-/// Views of a textured object contradict each other on less of its surface, at the edges of its print and of thin parts.
-pub(super) const CONTRADICTED: f64 = 0.1;
+/// A tip that is higher is named [voxel]: the lowest corners that views show are known to a voxel or two.
+const TIP: f64 = 2.0;
+/// What colours are compared with behind the surface [voxel].
+const DEEPER: f64 = 2.0;
+/// Thin walls on more of the surface are named [1]: edges of thick parts have some.
+const THIN: f64 = 0.05;
+/// Handles that things have: a pot has two, a basket or a kettle three.
+const HANDLES: i64 = 3;
+/// The finest grid that a person may ask for.
+const FINEST: u32 = 256;
 
 /// A view that took no part.
 #[derive(Debug, Clone)]
@@ -100,31 +109,52 @@ pub(super) fn depth_scale(grid: &Grid, distance: &[f32], frames: &[Frame]) -> Op
     if ratios.len() > 100 { median(ratios) } else { None }
 }
 
+/// Which share of what masks show a mesh leaves empty, their borders left out [1].
+fn left_empty(mesh: &Mesh, frames: &[Frame]) -> f64 {
+    let points = mesh.points.iter().map(|point| point.cast()).collect();
+    let body = splat::Mesh { points, triangles: mesh.triangles.clone(), color: [0; 3] };
+    let counts = frames.par_iter().map(|frame| {
+        let drawn = splats::draw_mesh(&body, &frame.camera, &frame.scan_from_camera);
+        let border = frame.border_distance(EDGE + 1);
+        let inside = || border.iter().zip(&drawn.depth).filter(|(steps, _)| **steps > EDGE);
+        (inside().filter(|(_, z)| **z <= 0.0).count(), inside().count())
+    });
+    let (empty, all) = counts.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    empty as f64 / all.max(1) as f64
+}
+
+/// What is known of an object, to say what a person should know.
+pub(super) struct Found<'a> {
+    pub(super) evidence: &'a Evidence,
+    pub(super) field: &'a Field<f32>,
+    pub(super) mesh: &'a Mesh,
+    pub(super) islands: &'a Islands,
+    pub(super) genus: i64,
+    /// Nodes along each edge, were the grid a cube.
+    pub(super) edge: u32,
+    pub(super) support: Option<&'a Support>,
+    /// Views to learn from and those held out.
+    pub(super) frames: [&'a [Frame]; 2],
+    pub(super) held_out: &'a [HeldOut],
+}
+
 /// What a person should know about the surface.
-pub(super) fn remarks(
-    evidence: &Evidence,
-    mesh: &Mesh,
-    islands: &Islands,
-    (views, with_depth): (&[HeldOut], bool),
-) -> Vec<Remark> {
+pub(super) fn remarks(found: &Found<'_>) -> Vec<Remark> {
     let mut remarks = Vec::new();
-    let share = evidence.share_shown_by_fewer(mesh, CERTAIN);
+    let share = found.evidence.share(found.mesh, Certainty::Unseen);
     if share > 0.02 {
         remarks.push(Remark(format!(
-            "{:.0} % of the surface is shown by fewer than {CERTAIN} views, and is a guess (grey in object.ply): take pictures from there",
+            "{:.0} % of the surface is shown by fewer than {SEEN} views, and is a guess (grey in object.ply): take pictures from there",
             share * 100.0
         )));
     }
-    if !with_depth {
-        remarks.push(hollows(evidence, mesh));
+    remarks.extend(underside(found));
+    if found.frames[0].iter().all(|frame| frame.depth.is_empty()) {
+        remarks.push(hollows(found));
     }
-    if islands.share > 0.02 {
-        remarks.push(Remark(format!(
-            "{} parts beside the object were left out, {:.0} % of its volume: does the mask show more than one object?",
-            islands.bodies,
-            islands.share * 100.0
-        )));
-    }
+    remarks.extend(walls(found));
+    remarks.extend(beside(found));
+    let views = found.held_out;
     let overlap = views.iter().map(|view| view.overlap).sum::<f64>() / views.len().max(1) as f64;
     if overlap < 0.9 {
         remarks.push(Remark(format!(
@@ -135,23 +165,80 @@ pub(super) fn remarks(
     remarks
 }
 
-/// Silhouettes show no hollow that opens to one side, and colours only some.
-fn hollows(evidence: &Evidence, mesh: &Mesh) -> Remark {
-    let share = evidence.share_contradicted(mesh);
-    Remark(if share > CONTRADICTED {
-        format!(
-            "on {:.0} % of the surface the views contradict each other in colour (grey in object.ply): it is not where they see it; without \
-             depth a hollow is filled there, and the volume too large: take pictures with depth",
-            share * 100.0
-        )
-    } else {
-        "made without depth: a hollow that no silhouette shows, as the inside of a cup, is filled where its colours are even, and has too \
-         thick a wall elsewhere: take pictures with depth"
-            .into()
+/// The end of an object below everything that views show, where nothing says on what it stands.
+fn underside(found: &Found<'_>) -> Option<Remark> {
+    if let Some(support) = found.support {
+        let whence = support.source.words();
+        return Some(Remark(format!(
+            "the base is closed in the plane of the table ({whence}), and is a guess: no picture shows it"
+        )));
+    }
+    let [frames, _] = found.frames;
+    let away = |frame: &Frame| (frame.scan_from_camera * Point3::origin() - found.mesh.middle()).normalize();
+    let up = frames.iter().map(away).sum::<Vector3<f64>>().try_normalize(1e-6)?;
+    let lowest = |counts: &dyn Fn(usize) -> bool| {
+        let heights = found.mesh.points.iter().enumerate().filter(|(corner, _)| counts(*corner));
+        heights.map(|(_, point)| up.dot(&point.coords)).fold(f64::INFINITY, f64::min)
+    };
+    let tip = lowest(&|corner| found.evidence.certainty[corner] != Certainty::Unseen) - lowest(&|_| true);
+    (tip.is_finite() && tip > TIP * found.field.grid.voxel).then(|| {
+        Remark(format!(
+            "no picture shows the lowest {:.1} mm: the underside is what the outlines leave open, a tip on which it cannot stand; say where \
+             the table is (--table), or take pictures from below",
+            tip * 1e3
+        ))
     })
 }
 
-/// Whether a corner that so many views show is certain.
-pub(crate) fn is_certain(shown: u8) -> bool {
-    shown >= CERTAIN
+/// Silhouettes show no hollow that opens to one side, and colours only some.
+fn hollows(found: &Found<'_>) -> Remark {
+    let share = |is| 100.0 * found.evidence.share(found.mesh, is);
+    let (contradicted, ambiguous) = (share(Certainty::Contradicted), share(Certainty::Ambiguous));
+    Remark(format!(
+        "made without depth: on {contradicted:.0} % of the surface the views contradict each other in colour, and on {ambiguous:.0} % colours \
+         agree as well {:.1} mm deeper and no outline shows it (both grey in object.ply): it may lie deeper there, a hollow be filled, a \
+         wall be too thick: take pictures with depth",
+        DEEPER * found.field.grid.voxel * 1e3
+    ))
+}
+
+/// Walls that are thin for the grid, and handles.
+fn walls(found: &Found<'_>) -> Vec<Remark> {
+    let thin = ThinWalls::of(found.field, found.mesh);
+    let mut remarks = Vec::new();
+    if thin.share > THIN {
+        let edge = thin.edge(found.edge);
+        let remedy = if edge <= FINEST {
+            format!("--grid {edge} shows them as they are")
+        } else {
+            format!("--grid {FINEST}, the finest, shows more of them")
+        };
+        remarks.push(Remark(format!(
+            "{:.0} % of the surface is of walls thinner than {:.1} mm, which is the least that this grid shows: their thickness and tunnels \
+             through them may be the grid's; {remedy}",
+            thin.share * 100.0,
+            ThinWalls::limit(found.field.grid.voxel) * 1e3
+        )));
+    }
+    if found.genus > HANDLES {
+        remarks.push(Remark(format!(
+            "it has {} handles (genus), and few things have more than {HANDLES}: look in object.ply for tunnels that the object does not have",
+            found.genus
+        )));
+    }
+    remarks
+}
+
+/// Parts that are not connected with the largest one.
+fn beside(found: &Found<'_>) -> Option<Remark> {
+    let Islands { bodies, share, .. } = found.islands;
+    (*share > 0.02).then(|| {
+        let empty = 100.0 * left_empty(found.mesh, found.frames[1]);
+        let why = if empty > 2.0 {
+            format!("without them {empty:.0} % of the masks is empty: do the masks show more than one object?")
+        } else {
+            "the masks are filled without them: views that few others overlap leave such parts".into()
+        };
+        Remark(format!("{bodies} parts beside the object were left out, {:.0} % of its volume; {why}", share * 100.0))
+    })
 }

@@ -3,6 +3,7 @@
 
 use super::adam::{Adam, Gathered, Rates};
 use super::band::Band;
+use super::bounds::Bounds;
 use super::colours;
 use super::hollow::{self, Search};
 use super::pool::{Pixel, Stand, corrected};
@@ -122,9 +123,8 @@ pub(crate) struct Learner<'a> {
     /// Standard deviation of depth at one metre [m], where there is depth.
     depth_spread: Option<f64>,
     pixels: &'a [Pixel],
+    bounds: &'a Bounds,
     pivot: Point3<f64>,
-    /// Half the object's diagonal [m].
-    radius: f64,
     parts: Vec<Gathered>,
     /// The nodes of the band.
     near: Option<Vec<u32>>,
@@ -135,9 +135,9 @@ impl<'a> Learner<'a> {
         plan: Plan,
         (frames, depth_spread): (&'a [Frame], Option<f64>),
         pixels: &'a [Pixel],
-        (pivot, radius): (Point3<f64>, f64),
+        bounds: &'a Bounds,
     ) -> Self {
-        Self { plan, frames, depth_spread, pixels, pivot, radius, parts: Vec::new(), near: None }
+        Self { plan, frames, depth_spread, pixels, bounds, pivot: bounds.centre(), parts: Vec::new(), near: None }
     }
 
     /// One step; at the end of a level the field goes on with nodes twice as dense. `true` while there are steps left.
@@ -189,7 +189,9 @@ impl<'a> Learner<'a> {
         let poses: Vec<_> = (0..self.frames.len()).map(|frame| self.pose(state, frame)).collect();
         let begun = || signed_distance(&fine.grid, &fine.distance);
         let distance = match self.depth_spread {
-            Some(spread) if is_last => start::distance(&fine.grid, &Seen::all(self.frames, Some(&poses)), Some(spread)),
+            Some(spread) if is_last => {
+                start::distance(&fine.grid, &Seen::all(self.frames, Some(&poses)), self.bounds, Some(spread))
+            }
             Some(_) => begun(),
             None => hollow::opened(&fine.grid, begun(), (self.frames, &poses), Search::REFINED),
         };
@@ -246,7 +248,7 @@ impl<'a> Learner<'a> {
     fn move_cameras(&self, state: &mut State, by_pose: &[[f64; 6]], rate: f64) {
         let State { corrections, moments, .. } = state;
         for ((correction, moments), slope) in corrections.iter_mut().zip(moments).zip(by_pose) {
-            move_camera(correction, moments, slope, rate, self.radius);
+            move_camera(correction, moments, slope, rate, self.bounds.radius());
         }
         let away: Vec<Vector3<f64>> =
             self.frames.iter().map(|frame| frame.scan_from_camera * Point3::origin() - self.pivot).collect();

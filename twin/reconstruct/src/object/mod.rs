@@ -15,11 +15,12 @@
 //! | `colours` | colours beside the surface |
 //! | `adam` | steps along derivatives |
 //! | `learn` | the optimisation, coarse to fine |
-//! | `table` | nothing lies below the table |
+//! | `table` | where the table is, and that nothing lies below it |
 //! | `view` | whole pictures of the field |
 //! | `appearance` | splats on the surface, trained on the views |
 //! | `neighbours` | which corners of a surface are beside each other |
-//! | `evidence` | what views show of the surface, and where they contradict each other |
+//! | `evidence` | what views show of the surface, and whether they say where it is |
+//! | `walls` | walls that are thin for the grid |
 //! | `judge` | held-out views, and what a person should know |
 //! | `state` | what there is when the work is interrupted |
 
@@ -43,19 +44,21 @@ mod state;
 mod stereo;
 mod table;
 mod view;
+mod walls;
 
+pub use evidence::Certainty;
 pub use judge::HeldOut;
-pub(crate) use judge::is_certain;
 pub use state::StateError;
+pub use table::{Support, TableSource};
 pub use view::{Drawn, draw};
 
 use crate::closing;
 use crate::field::{Field, Grid};
 use crate::mesh::{self, Flaw, Islands, Mesh, Solid, Topology};
 use crate::remark::Remark;
-use crate::scan::{Frame, Scale, ScaleSource, Scan, ScanError};
-use bounds::Bounds;
+use crate::scan::{Frame, Scale, ScaleSource, Scan, ScanError, Table};
 use evidence::Evidence;
+use judge::Found;
 use learn::{Learner, Plan, State};
 use nalgebra::{Isometry3, Point3};
 use pictures::Pictures;
@@ -128,8 +131,10 @@ pub struct Object {
     pub solid: Solid,
     /// How many views show each corner of the fine mesh.
     pub shown: Vec<u8>,
-    /// Whether these views contradict each other about its colour.
-    pub contradicted: Vec<bool>,
+    /// Whether these views say where it is.
+    pub certainty: Vec<Certainty>,
+    /// The table at which the base is closed, a guess, where something says where that is.
+    pub support: Option<Support>,
     /// What was left out beside it.
     pub islands: Islands,
     /// Where its scale comes from.
@@ -153,6 +158,8 @@ pub struct Options {
     pub scale: Option<f64>,
     /// The grid has about as many nodes as a cube with so many along each edge.
     pub edge: u32,
+    /// The plane on which the object stands, in the frame and the unit of the poses; `None`: as the scan or its pictures say.
+    pub table: Option<Table>,
 }
 
 /// Makes an object of a scan; what is done is kept in the file `kept` now and then, and a run that finds it goes on from there.
@@ -163,19 +170,22 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
     let bar = Progress::planned("reconstruct", &STAGES, scan.views.len() as u64);
     let scale = scan.scale(options.scale)?;
     let scan = scan.scaled(scale.metres);
-    let pictures = pictures::read(&scan, |done| bar.show(done, READ))?;
+    let mut pictures = pictures::read(&scan, |done| bar.show(done, READ))?;
     bar.stage(START, 2);
     let plan = Plan::new(options.edge, pictures.depth_spread.is_some());
-    let bounds = bounds::find(&pictures.train)?;
+    let mut bounds = bounds::find(&pictures.train)?;
+    pictures.remarks.extend(bounds.remark(pictures.train.len()));
+    let given = options.table.map(|table| table.scaled(scale.metres));
+    let support = table::find(&scan, given, &mut pictures, &mut bounds)?;
     let seen = Seen::all(&pictures.train, None);
     let grid = Grid::filling(&bounds.low, &bounds.high, plan.levels[0].nodes, 2);
-    let distance = start::distance(&grid, &seen, pictures.depth_spread);
-    let metres = judge::depth_scale(&grid, &start::distance(&grid, &seen, None), &pictures.train);
+    let distance = start::distance(&grid, &seen, &bounds, pictures.depth_spread);
+    let metres = judge::depth_scale(&grid, &start::distance(&grid, &seen, &bounds, None), &pictures.train);
     if let (ScaleSource::Poses, Some(metres)) = (scale.source, metres.filter(|m| (m - 1.0).abs() > 0.03)) {
         return Err(ObjectError::Scale { metres });
     }
     let pixels = pool::pixels(&pictures.train);
-    let mut keeper = Keeper::new(kept, options, &pictures, &pixels);
+    let mut keeper = Keeper::new(kept, options.edge, &bounds, (&pictures, &pixels));
     let fresh = || State::new(grid, begun(&grid, distance, &pictures), pictures.train.len());
     let mut state = keeper.take()?.unwrap_or_else(fresh);
     if state.level < plan.levels.len() {
@@ -183,10 +193,10 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
     }
     interrupted(&plan, &state)?;
     let train = (pictures.train.as_slice(), pictures.depth_spread);
-    let learner = Learner::new(plan.clone(), train, &pixels, (bounds.centre(), bounds.radius()));
+    let learner = Learner::new(plan.clone(), train, &pixels, &bounds);
     let poses = learn(&bar, &plan, learner, &mut state, &mut keeper)?;
-    if let Some(height) = scan.table {
-        table::cut(&mut state.field, height);
+    if let Some(support) = &support {
+        table::cut(&mut state.field, &support.table);
     }
     bar.stage(MESH, 3);
     let gap = if pictures.depth_spread.is_some() { closing::PINHOLE } else { closing::TUNNEL };
@@ -204,7 +214,17 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         held_out.push(judge::held_out(&state.field, &splats, frame, &bounds));
     }
     let mut remarks = pictures.remarks;
-    remarks.extend(judge::remarks(&evidence, &shape.fine, &shape.islands, (&held_out, scan.has_depth())));
+    remarks.extend(judge::remarks(&Found {
+        evidence: &evidence,
+        field: &state.field,
+        mesh: &shape.fine,
+        islands: &shape.islands,
+        genus: shape.topology.genus,
+        edge: options.edge,
+        support: support.as_ref(),
+        frames: [&pictures.train, &pictures.held_out],
+        held_out: &held_out,
+    }));
     let shifts = state.corrections.iter().map(|c| c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
     let moved = (shifts.sum::<f64>() / state.corrections.len() as f64).sqrt();
     let Shape { fine, coarse, topology, solid, islands } = shape;
@@ -216,20 +236,21 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         topology,
         solid,
         shown: evidence.views,
-        contradicted: evidence.contradicted,
+        certainty: evidence.certainty,
+        support,
         islands,
         scale,
         held_out,
-        train: pictures
-            .train
-            .into_iter()
-            .zip(poses)
-            .map(|(frame, pose)| Frame { scan_from_camera: pose, ..frame })
-            .collect(),
+        train: moved_to(pictures.train, poses),
         with_depth: scan.has_depth(),
         moved,
         remarks,
     })
+}
+
+/// Views from where their cameras stand by now.
+fn moved_to(frames: Vec<Frame>, poses: Vec<Isometry3<f64>>) -> Vec<Frame> {
+    frames.into_iter().zip(poses).map(|(frame, pose)| Frame { scan_from_camera: pose, ..frame }).collect()
 }
 
 /// The distance that the optimisation begins with: without depth, that of the hull without its hollows.
@@ -306,18 +327,15 @@ pub fn forget(kept: &Path) -> Result<(), StateError> {
     state::forget(kept)
 }
 
-impl Bounds {
-    /// Half the diagonal [m].
-    fn radius(&self) -> f64 {
-        0.5 * (self.high - self.low).norm()
-    }
-}
-
 impl Object {
     /// Middle of the fine mesh's box: where the object's own frame has its origin, in the scan's frame [m].
     pub fn middle(&self) -> Point3<f64> {
-        let (low, high) = self.fine.bounds();
-        nalgebra::center(&low, &high)
+        self.fine.middle()
+    }
+
+    /// Which share of the fine mesh's surface is so [1].
+    pub fn share(&self, is: Certainty) -> f64 {
+        evidence::share(&self.fine, |corner| self.certainty[corner] == is)
     }
 
     /// Mean PSNR of the held-out views inside the mask [dB].

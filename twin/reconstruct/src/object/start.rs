@@ -1,9 +1,11 @@
 //! Where the optimisation starts: the masks' visual hull and, where there is depth, the depths fused into it.
 //!
 //! Hull: a node is as far outside as the view says that has it furthest outside its mask (Laurentini 1994), but for the few that
-//! noise of the masks may have put there. Fusion: mean of truncated distances along the rays (Curless and Levoy 1996), weighted by the
+//! noise of the masks may have put there; where too few views look, or below the table, nothing is. A view whose mask ends within its picture
+//! shows all of the object, and has nothing of it beside the picture. Fusion: mean of truncated distances along the rays (Curless and Levoy 1996), weighted by the
 //! variance of depth, which grows with its fourth power.
 
+use super::bounds::Bounds;
 use crate::field::Grid;
 use crate::scan::Frame;
 use crate::sweep;
@@ -20,6 +22,8 @@ pub(crate) struct Seen<'a> {
     frame: &'a Frame,
     camera_from_scan: Isometry3<f64>,
     border: Vec<i16>,
+    /// Whether all of the object is in the picture: its mask ends within.
+    is_whole: bool,
 }
 
 impl<'a> Seen<'a> {
@@ -27,7 +31,8 @@ impl<'a> Seen<'a> {
     pub(crate) fn all(frames: &'a [Frame], poses: Option<&[Isometry3<f64>]>) -> Vec<Self> {
         let seen = |(number, frame): (usize, &'a Frame)| {
             let pose = poses.map_or(frame.scan_from_camera, |poses| poses[number]);
-            Self { frame, camera_from_scan: pose.inverse(), border: frame.border_distance(REACH) }
+            let is_whole = !frame.is_cut_off();
+            Self { frame, camera_from_scan: pose.inverse(), border: frame.border_distance(REACH), is_whole }
         };
         frames.par_iter().enumerate().map(seen).collect()
     }
@@ -41,9 +46,9 @@ impl<'a> Seen<'a> {
         inside.then(|| (v as usize * width as usize + u as usize, local.z))
     }
 
-    /// How far outside the mask a place appears [m], negative inside; `None` outside the picture.
-    fn outside(&self, point: &Point3<f64>) -> Option<f64> {
-        let (pixel, z) = self.pixel(point)?;
+    /// How far outside the mask a place appears [m], negative inside; `None` outside of a picture that does not show all of the object.
+    pub(crate) fn outside(&self, point: &Point3<f64>) -> Option<f64> {
+        let Some((pixel, z)) = self.pixel(point) else { return self.is_whole.then(|| self.beside(point)) };
         let pixels = match self.border[pixel] {
             // The border lies between the pixels beside it.
             steps if steps > 0 => 0.5 - f64::from(steps),
@@ -51,9 +56,18 @@ impl<'a> Seen<'a> {
         };
         Some(pixels * z / self.frame.camera.focal[0])
     }
+
+    /// How far a place outside of the picture is from its edge [m], at most as far as pixels are counted.
+    fn beside(&self, point: &Point3<f64>) -> f64 {
+        let (camera, local) = (&self.frame.camera, self.camera_from_scan * point);
+        let past = |at: f64, size: u32| (-at).max(at - f64::from(size)).max(0.0);
+        let pixels =
+            camera.project(&local).map_or(f64::INFINITY, |[u, v]| past(u, camera.width).max(past(v, camera.height)));
+        (pixels + 1.0).min(f64::from(REACH)) * local.coords.norm() / camera.focal[0]
+    }
 }
 
-/// Of so many views how many may see a place outside their mask though it is inside.
+/// Of so many views that see a place how many may see it outside their mask though it is inside.
 fn allowed(views: usize) -> usize {
     match views {
         ..16 => 0,
@@ -63,22 +77,22 @@ fn allowed(views: usize) -> usize {
 }
 
 /// How far outside the masks' hull each node is [m], negative inside.
-pub(crate) fn hull(grid: &Grid, seen: &[Seen<'_>]) -> Vec<f32> {
-    let kept = allowed(seen.len()) + 1;
+pub(crate) fn hull(grid: &Grid, seen: &[Seen<'_>], within: &Bounds) -> Vec<f32> {
     let node = |index: usize| {
         let point = grid.position(grid.node(index));
-        let mut largest = [f64::NEG_INFINITY; 3];
+        let (mut views, mut largest) = (0, [f64::NEG_INFINITY; 3]);
         for outside in seen.iter().filter_map(|view| view.outside(&point)) {
+            views += 1;
             let mut value = outside;
-            for slot in &mut largest[..kept] {
+            for slot in &mut largest {
                 if value > *slot {
                     std::mem::swap(&mut value, slot);
                 }
             }
         }
         // A place that too few views see is taken for outside.
-        let level = largest[kept - 1];
-        if level == f64::NEG_INFINITY { grid.voxel as f32 } else { level as f32 }
+        let level = if views < within.fewest { grid.voxel } else { largest[allowed(views)] };
+        level.max(within.below(&point)) as f32
     };
     (0..grid.len()).into_par_iter().map(node).collect()
 }
@@ -91,7 +105,7 @@ fn vote(apart: f64, cut: f64) -> (f64, f64) {
 }
 
 /// Depth fused into the hull: the level [m] of each node. `spread`: standard deviation of depth at one metre [m].
-fn fused(grid: &Grid, seen: &[Seen<'_>], hull: &[f32], spread: f64) -> Vec<f32> {
+fn fused(grid: &Grid, seen: &[Seen<'_>], (hull, within): (&[f32], &Bounds), spread: f64) -> Vec<f32> {
     let node = |index: usize| {
         let point = grid.position(grid.node(index));
         let (mut sum, mut total) = (0.0, 0.0);
@@ -115,16 +129,16 @@ fn fused(grid: &Grid, seen: &[Seen<'_>], hull: &[f32], spread: f64) -> Vec<f32> 
             sum += weight * apart;
             total += weight;
         }
-        if total > 0.0 { (sum / total) as f32 } else { hull[index] }
+        if total > 0.0 { (sum / total).max(within.below(&point)) as f32 } else { hull[index] }
     };
     (0..grid.len()).into_par_iter().map(node).collect()
 }
 
 /// The signed distance [voxel] that the optimisation begins with: of the hull, or of depth fused into it.
-pub(crate) fn distance(grid: &Grid, seen: &[Seen<'_>], depth_spread: Option<f64>) -> Vec<f32> {
-    let hull = hull(grid, seen);
+pub(crate) fn distance(grid: &Grid, seen: &[Seen<'_>], within: &Bounds, depth_spread: Option<f64>) -> Vec<f32> {
+    let hull = hull(grid, seen, within);
     let mut level = match depth_spread {
-        Some(spread) => fused(grid, seen, &hull, spread),
+        Some(spread) => fused(grid, seen, (&hull, within), spread),
         None => hull,
     };
     without_rim(grid, &mut level);

@@ -1,9 +1,9 @@
 //! What there is when the work is interrupted: a file beside the outputs, out of which the same command goes on as if nothing had been.
 //! It belongs to one scan and one build: of another, it is not taken.
 
-use super::Options;
 use super::adam::Adam;
 use super::band::Band;
+use super::bounds::Bounds;
 use super::learn::State;
 use super::pictures::Pictures;
 use super::pool::Pixel;
@@ -55,10 +55,11 @@ pub(super) struct Keeper<'a> {
 }
 
 impl<'a> Keeper<'a> {
-    pub(super) fn new(path: &'a Path, options: &Options, pictures: &Pictures, pixels: &[Pixel]) -> Self {
+    pub(super) fn new(path: &'a Path, edge: u32, bounds: &Bounds, (pictures, pixels): (&Pictures, &[Pixel])) -> Self {
         let mut hasher = DefaultHasher::new();
         env!("CARGO_PKG_VERSION").hash(&mut hasher);
-        options.edge.hash(&mut hasher);
+        edge.hash(&mut hasher);
+        format!("{bounds:?}").hash(&mut hasher);
         for frame in &pictures.train {
             frame.name.hash(&mut hasher);
             format!("{:?}", frame.camera).hash(&mut hasher);

@@ -68,27 +68,27 @@ impl<'a> Stereo<'a> {
         Self { frames, poses, views }
     }
 
+    /// Whether the views do not say where each corner of a mesh on the surface of `field` is: they agree better at one of the `tried` depths
+    /// behind it, or as well at all of them.
+    pub(super) fn ambiguous(&self, field: &Field<f32>, mesh: &Mesh, tried: usize) -> Vec<bool> {
+        let normals = evidence::normals(mesh);
+        let seen = evidence::seen_by((field, mesh, &normals), (self.frames, self.poses));
+        let variances = self.variances((field, mesh), &Neighbours::of(mesh), &seen, tried);
+        let is_ambiguous = |(variances, seen): (&Vec<Option<Variance>>, &Vec<u16>)| {
+            let is_certain = matches!(best(variances, seen.len()), Best::At([0, last]) if last + 1 < tried);
+            !is_certain || variances.iter().all(Option::is_none)
+        };
+        variances.iter().zip(&seen).map(is_ambiguous).collect()
+    }
+
     /// How far behind each corner of a mesh on the surface of `field` the views agree best [step], of `tried` depths of which the
     /// surface's own is the first; 0 where they do so on it, or say nothing.
     pub(super) fn depths(&self, field: &Field<f32>, mesh: &Mesh, tried: usize) -> Vec<f64> {
         let normals = evidence::normals(mesh);
         let neighbours = Neighbours::of(mesh);
         let seen = evidence::seen_by((field, mesh, &normals), (self.frames, self.poses));
-        let step = STEP * field.grid.voxel;
-        let at = |number: usize| {
-            let variance = |corner: usize| {
-                self.variance(&(mesh.points[corner] - normals[corner] * (number as f64 * step)), &seen[corner])
-            };
-            let all: Vec<Option<Variance>> = (0..mesh.points.len()).into_par_iter().map(variance).collect();
-            let smoothed = |i: usize| neighbours.smoothed(all.iter().map(|v| v.map(|v| v[i])).collect());
-            (smoothed(0), smoothed(1))
-        };
-        let variances: Vec<_> = (0..tried).map(at).collect();
-        let best = |corner: usize| {
-            let of = |(left, all): &(Vec<Option<f64>>, Vec<Option<f64>>)| Some([left[corner]?, all[corner]?]);
-            best(&variances.iter().map(of).collect::<Vec<_>>(), seen[corner].len())
-        };
-        let best: Vec<Best> = (0..mesh.points.len()).map(best).collect();
+        let variances = self.variances((field, mesh), &neighbours, &seen, tried);
+        let best: Vec<Best> = variances.iter().zip(&seen).map(|(all, seen)| best(all, seen.len())).collect();
         // What fills a hollow is smaller than what is around it: views that agree hardly anywhere cannot be compared by colour.
         if 2 * best.iter().filter(|best| **best == Best::Nowhere).count() > best.len() {
             return vec![0.0; best.len()];
@@ -98,6 +98,29 @@ impl<'a> Stereo<'a> {
             Best::Nowhere => [FURTHER; 2],
         });
         smoothest(&neighbours, &depths.collect::<Vec<_>>())
+    }
+
+    /// Of each corner and those around it, at so many depths behind it.
+    fn variances(
+        &self,
+        (field, mesh): (&Field<f32>, &Mesh),
+        neighbours: &Neighbours,
+        seen: &[Vec<u16>],
+        tried: usize,
+    ) -> Vec<Vec<Option<Variance>>> {
+        let (normals, step) = (evidence::normals(mesh), STEP * field.grid.voxel);
+        let mut variances = vec![Vec::with_capacity(tried); mesh.points.len()];
+        for number in 0..tried {
+            let variance = |corner: usize| {
+                self.variance(&(mesh.points[corner] - normals[corner] * (number as f64 * step)), &seen[corner])
+            };
+            let all: Vec<Option<Variance>> = (0..mesh.points.len()).into_par_iter().map(variance).collect();
+            let [left, whole] = [0, 1].map(|i| neighbours.smoothed(all.iter().map(|v| v.map(|v| v[i])).collect()));
+            for ((variances, left), whole) in variances.iter_mut().zip(left).zip(whole) {
+                variances.push(left.zip(whole).map(|(left, whole)| [left, whole]));
+            }
+        }
+        variances
     }
 
     /// Of the views that show a place, or what lies before it.

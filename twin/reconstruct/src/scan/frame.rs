@@ -102,6 +102,14 @@ impl Frame {
         self.mask.iter().filter(|inside| **inside).count()
     }
 
+    /// Whether the mask goes on to an edge of the picture, so that a part of the object may lie beside it.
+    pub(crate) fn is_cut_off(&self) -> bool {
+        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
+        let mut rows = (0..width).flat_map(|column| [column, (height - 1) * width + column]);
+        let mut columns = (0..height).flat_map(|row| [row * width, row * width + width - 1]);
+        rows.any(|at| self.mask[at]) || columns.any(|at| self.mask[at])
+    }
+
     /// How far a pixel is from the mask's border [pixel]: positive inside, negative outside, cut at `most`. Distances count steps to
     /// the eight neighbours.
     pub fn border_distance(&self, most: i16) -> Vec<i16> {

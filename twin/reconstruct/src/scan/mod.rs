@@ -10,6 +10,7 @@
 //! | `held` | poses of a camera that a robot holds, from those of its end effector |
 //! | `frame` | the pixels of one view |
 //! | `scale` | metres for one unit of the poses |
+//! | `table` | the plane on which the object stands |
 //! | `error` | why a scan cannot be used |
 
 mod beside;
@@ -20,16 +21,18 @@ mod frame;
 mod held;
 mod picture;
 mod scale;
+mod table;
 mod transforms;
 
 pub use camera::Camera;
 pub use error::ScanError;
 pub use frame::Frame;
 pub use scale::{Scale, ScaleSource};
+pub use table::Table;
 
 use crate::remark::Remark;
 use beside::Beside;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use shared_mem::ending;
 use std::path::{Path, PathBuf};
 
@@ -74,8 +77,8 @@ pub struct Scan {
     /// Whether the poses are in metres.
     pub(crate) says_metres: bool,
     of_robot: bool,
-    /// How high the table is on which the object stands: z of the scan's frame [m].
-    pub(crate) table: Option<f64>,
+    /// On what the object stands, where the scan says it.
+    pub(crate) table: Option<Table>,
 }
 
 /// Where the poses of a scan stand.
@@ -195,6 +198,16 @@ impl Scan {
         Frame::read(&self.views[view], self.depth_unit, by, true)
     }
 
+    /// Points of the COLMAP model, once for each view that shows one: the view, and the pixel and the place where it does [m, once the scan
+    /// is in metres].
+    pub(crate) fn model_points(&self) -> impl Iterator<Item = (&View, [f64; 2], Point3<f64>)> {
+        self.known_depths.iter().map(|(view, pixel, z)| {
+            let view = &self.views[*view];
+            let [x, y] = view.camera.direction(*pixel);
+            (view, *pixel, view.scan_from_camera * Point3::new(x * z, y * z, *z))
+        })
+    }
+
     /// Whether a robot held the camera: its poses are then metres in its base frame, whose z points up.
     pub fn is_of_robot(&self) -> bool {
         self.of_robot
@@ -206,7 +219,7 @@ impl Scan {
             view.scan_from_camera.translation.vector *= metres;
         }
         self.known_depths.iter_mut().for_each(|(_, _, z)| *z *= metres);
-        self.table = self.table.map(|height| height * metres);
+        self.table = self.table.map(|table| table.scaled(metres));
         self.says_metres = true;
         self
     }

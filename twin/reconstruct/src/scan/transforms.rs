@@ -6,6 +6,7 @@ use super::camera::Camera;
 use super::error::ScanError;
 use super::held::Held;
 use super::picture;
+use super::table::Table;
 use crate::remark::Remark;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
@@ -26,11 +27,22 @@ struct File {
     depth_unit_scale_factor: Option<f64>,
     /// How the camera is mounted, where frames give the end effector's pose.
     hand_eye: Option<PathBuf>,
-    /// How high the table is on which the object stands [m].
-    table: Option<f64>,
+    /// On what the object stands.
+    table: Option<Stated>,
     frames: Vec<Frame>,
     #[serde(flatten)]
     others: BTreeMap<String, Other>,
+}
+
+/// How a file states the table, in the frame and the unit of its poses.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "`table` is its height along z, or [nx, ny, nz, d]: its normal, up, and its distance from the origin along it"
+)]
+enum Stated {
+    Height(f64),
+    Plane([f64; 4]),
 }
 
 #[derive(Debug, Deserialize)]
@@ -100,8 +112,8 @@ pub(crate) struct List {
     pub(crate) depth_unit: Option<f64>,
     /// Whether poses are a robot's: metres in its base frame.
     pub(crate) of_robot: bool,
-    /// How high the table is, where a robot's file says it [m].
-    pub(crate) table: Option<f64>,
+    /// On what the object stands, where the file says it.
+    pub(crate) table: Option<Table>,
     /// What was not read of the file.
     pub(crate) remarks: Vec<Remark>,
 }
@@ -141,12 +153,12 @@ pub(crate) fn read(path: &Path) -> Result<List, ScanError> {
     let listed = listed.collect::<Result<_, ScanError>>()?;
     Numbers::none_unread(&file.others).map_err(bad)?;
     let of_robot = is_held || path.file_name().is_some_and(|name| name == "poses.json");
-    if file.table.is_some_and(|height| !height.is_finite() || !of_robot) {
-        return Err(bad(
-            "`table` is the height of the table in a robot's base frame [m], and goes with poses in it".into()
-        ));
-    }
-    Ok(List { table: file.table, of_robot, listed, depth_unit: file.depth_unit_scale_factor, remarks: unread(&file) })
+    let table = file.table.map(|stated| match stated {
+        Stated::Height(z) => Ok(Table::at_height(z)),
+        Stated::Plane(plane) => Table::plane(plane).ok_or("`table` is no plane: nx, ny, nz are the normal, not all 0"),
+    });
+    let table = table.transpose().map_err(|what| bad(what.into()))?;
+    Ok(List { table, of_robot, listed, depth_unit: file.depth_unit_scale_factor, remarks: unread(&file) })
 }
 
 /// A remark on keys that say something here nobody knows.
@@ -239,6 +251,17 @@ mod tests {
     }
 
     #[test]
+    fn a_table_is_a_height_or_a_plane() {
+        let table = |stated: &str| {
+            let text =
+                frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5]]").replace("\"k1\"", &format!("\"table\": {stated}, \"k1\""));
+            read_text(&text).expect("a scan").table.expect("a table")
+        };
+        assert_eq!(table("0.1"), Table::at_height(0.1));
+        assert_eq!(table("[0, -2, 0, 0.3]"), Table { normal: -Vector3::y(), offset: 0.15 });
+    }
+
+    #[test]
     fn three_rows_are_a_matrix_and_what_other_programs_say_is_passed_over_or_named() {
         let full = read_text(&frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5],[0,0,0,1]]")).expect("a scan");
         let rows = read_text(&frame("[[1,0,0,0.1],[0,1,0,0],[0,0,1,0.5]]")).expect("a scan");
@@ -270,7 +293,8 @@ mod tests {
             ),
             (r#"{"fl_x": 640, "frames": [{"file_path": "a.png"}]}"#.into(), "`w` and `h` are missing"),
             (r#"{"fl_x": 640, "w": 9, "h": 9, "s1": 0.1, "frames": []}"#.into(), "`s1`"),
-            (format!(r#"{{{HEAD}, "table": 0.1, "frames": []}}"#), "a robot's base frame"),
+            (format!(r#"{{{HEAD}, "table": [0, 0, 0, 0.1], "frames": []}}"#), "`table` is no plane"),
+            (format!(r#"{{{HEAD}, "table": [0, 1, 0], "frames": []}}"#), "[nx, ny, nz, d]"),
             (format!(r#"{{{HEAD}, "distCoeffs": [0.1], "frames": []}}"#), "`distCoeffs`"),
             (format!(r#"{{{HEAD}, "camera": {{"k2": 0.1}}, "frames": []}}"#), "`camera` holds `k2`"),
             (frame("[[1,0,0,0],[0,1,0,0],[0,0,1,0]]").replace("\"k1\"", "\"camera_type\": \"omni\", \"k1\""), "`omni`"),
