@@ -70,7 +70,7 @@ pub struct Comparison {
     pub p: Option<f64>,
 }
 
-/// Most chance of a parting by luck with which two shares are told apart (a choice, that of their intervals).
+/// Largest chance of such a difference by luck with which two shares count as different (a choice, that of their intervals).
 const LUCK: f64 = 0.05;
 
 impl Comparison {
@@ -266,14 +266,14 @@ mod tests {
     }
 
     #[test]
-    fn four_of_four_against_none_are_too_few_to_tell_and_six_of_six_are_enough() {
-        let told = |count| {
+    fn four_of_four_against_none_are_too_few_and_six_of_six_are_enough() {
+        let differ = |count| {
             let given = [trials("twin", "a", count, count), trials("twin", "b", 0, count)].concat();
             let comparison = findings(&given, &[], 1).policies[0].comparison;
             assert!(comparison.interval[0] > 0.0, "{comparison:?}");
             comparison.tells_apart()
         };
-        assert_eq!([4, 6].map(told), [false, true]);
+        assert_eq!([4, 6].map(differ), [false, true]);
     }
 
     #[test]

@@ -61,12 +61,12 @@ pub fn sentence(findings: &Findings) -> String {
 /// Which policy beats which by most, where there are several.
 fn better(findings: &Findings) -> Option<String> {
     let of = |pair: &&PolicyPair| pair.comparison.difference.abs();
-    let told_apart = |pair: &&PolicyPair| pair.comparison.tells_apart();
+    let differs = |pair: &&PolicyPair| pair.comparison.tells_apart();
     let all = &findings.policies;
     if all.is_empty() {
         return None;
     }
-    let Some(most) = all.iter().filter(told_apart).max_by(|a, b| of(a).total_cmp(&of(b))) else {
+    let Some(most) = all.iter().filter(differs).max_by(|a, b| of(a).total_cmp(&of(b))) else {
         return Some("Too few trials to tell the policies apart.".into());
     };
     let Comparison { difference, interval: [low, high], .. } = most.comparison;
@@ -75,7 +75,7 @@ fn better(findings: &Findings) -> Option<String> {
         if difference > 0.0 { (first, second, [low, high]) } else { (second, first, [-high, -low]) };
     let several = all.iter().any(|pair| pair.world != most.world);
     let world = if several { format!(" in {}", most.world) } else { String::new() };
-    let others = all.iter().filter(told_apart).count() - 1;
+    let others = all.iter().filter(differs).count() - 1;
     let others = match others {
         0 => String::new(),
         1 => "; 1 other pair differs as well".to_owned(),

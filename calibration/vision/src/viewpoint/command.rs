@@ -135,7 +135,9 @@ pub fn run(options: &Options, interrupt: &Interrupt) -> anyhow::Result<Viewpoint
     };
     let start = start.map(|pose| pose.inverse().isometry());
     let answer_file = options.out.as_ref().or(options.report.as_ref()).map(Destination::path);
-    let asked = kept::question(options, (&cell, &camera), &frames, &pixels);
+    let set = format!("{:?}", (&options.start, reach, method, options.hand, options.seed, &camera));
+    let beside = options.masks.iter().chain(&options.background);
+    let asked = kept::question(&set, &cell, beside, &frames, &pixels);
     let work = for_work(answer_file, &options.targets[0], "viewpoint", &asked, interrupt);
     let found = match (&start, &options.start) {
         (Some(start), _) => fit(&frames, &shape, start, &reach, method, options.seed),

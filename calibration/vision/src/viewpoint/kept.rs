@@ -1,6 +1,5 @@
 //! What an interrupted search goes on from, and the question that it belongs to.
 
-use super::command::Options;
 use super::fit::Fit;
 use super::frame::Frame;
 use super::interval::Interval;
@@ -8,20 +7,21 @@ use super::picture::Pixels;
 use inference::kept::Fingerprint;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
-use shared_mem::cell::{Camera, Cell};
+use shared_mem::cell::Cell;
 use shared_mem::input;
+use std::path::PathBuf;
 
-/// What the pose depends on, wherever the answer goes.
-pub(super) fn question(
-    options: &Options,
-    (cell, camera): (&Cell, &Camera),
+/// What the pose depends on, wherever the answer goes. `asked`: what was asked for, and the lens; `beside`: masks and the picture without
+/// the robot.
+pub(super) fn question<'a>(
+    asked: &str,
+    cell: &Cell,
+    beside: impl Iterator<Item = &'a PathBuf>,
     frames: &[Frame],
     pixels: &[Pixels],
 ) -> Fingerprint {
-    let Options { start, reach, method, hand, seed, masks, background, .. } = options;
-    let set = format!("{:?}", (start, reach, method, hand, seed, camera));
-    let beside = masks.iter().chain(background).map(|file| input::bytes(file, input::Kind::Picture).ok());
-    let asked = Fingerprint::of("viewpoint").with(&set).with_cell(cell).with(&beside.collect::<Vec<_>>());
+    let beside: Vec<_> = beside.map(|file| input::bytes(file, input::Kind::Picture).ok()).collect();
+    let asked = Fingerprint::of("viewpoint").with(&asked).with_cell(cell).with(&beside);
     let joints = asked.with_numbers(frames.iter().flat_map(|frame| &frame.q));
     let shown = pixels.iter().flat_map(|picture| &picture.channels);
     shown.fold(joints, |print, channel| print.with(&channel.values.iter().map(|v| v.to_bits()).collect::<Vec<u32>>()))

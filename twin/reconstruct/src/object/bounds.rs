@@ -1,5 +1,6 @@
 //! Where the object is: a box around what all masks see. A scan whose masks and poses do not belong together shows here.
 
+use super::extent::Bounds;
 use super::start::{self, Seen};
 use crate::field::Grid;
 use crate::remark::Remark;
@@ -35,32 +36,7 @@ pub(super) enum Misplaced {
     Beneath(f64),
 }
 
-/// A box that holds the object [m], and which places in it may be the object's.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bounds {
-    pub(crate) low: Point3<f64>,
-    pub(crate) high: Point3<f64>,
-    /// Of places about which fewer views say something nothing is known.
-    pub(crate) fewest: usize,
-    /// Below it nothing is.
-    pub(crate) table: Option<Table>,
-}
-
 impl Bounds {
-    pub(crate) fn centre(&self) -> Point3<f64> {
-        nalgebra::center(&self.low, &self.high)
-    }
-
-    /// Half the diagonal [m].
-    pub(crate) fn radius(&self) -> f64 {
-        0.5 * (self.high - self.low).norm()
-    }
-
-    /// How far below the table a place is [m], negative above.
-    pub(crate) fn below(&self, point: &Point3<f64>) -> f64 {
-        self.table.map_or(f64::NEG_INFINITY, |table| -table.height(point))
-    }
-
     /// The box of what stands on a table.
     ///
     /// # Errors

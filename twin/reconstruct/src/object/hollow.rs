@@ -2,7 +2,7 @@
 //! of a surface that is bent otherwise than the right one they do so too early. Where they agree on it as it is, it stays, and what lies
 //! behind it: silhouettes show it.
 
-use super::evidence;
+use super::corners;
 use super::simple;
 use super::stereo::{STEP, Stereo};
 use crate::closing;
@@ -83,7 +83,7 @@ fn near(grid: &Grid, surface: &Mesh, is: impl Fn(usize) -> bool) -> impl Fn(usiz
 /// Takes balls out of the body on each corner's way inwards, but for what stays, and without piercing it; `depths` in [`STEP`].
 fn take_away(field: &mut Field<f32>, surface: &Mesh, depths: &[f64], stays: impl Fn(usize) -> bool) {
     let grid = field.grid;
-    let normals = evidence::normals(surface);
+    let normals = corners::normals(surface);
     let mut wanted = BTreeMap::new();
     for ((point, normal), depth) in surface.points.iter().zip(&normals).zip(depths) {
         for number in 0..depth.round() as usize {

@@ -1,7 +1,7 @@
 //! How good it is, by pictures that took no part; and what a person should know about the surface.
 
-use super::bounds::Bounds;
 use super::evidence::{Certainty, Evidence, SEEN};
+use super::extent::Bounds;
 use super::learn;
 use super::pool;
 use super::table::Support;

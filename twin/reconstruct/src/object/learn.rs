@@ -3,8 +3,8 @@
 
 use super::adam::{Adam, Gathered, Rates};
 use super::band::Band;
-use super::bounds::Bounds;
 use super::colours;
+use super::extent::Bounds;
 use super::hollow::{self, Search};
 use super::pool::{Pixel, Stand, corrected};
 use super::ray::{Medium, Receiver, Tracer, Weights, reach};

@@ -3,7 +3,7 @@
 //! | file | owns |
 //! |---|---|
 //! | `pictures` | the views' pixels, and which of them say nothing |
-//! | `bounds` | where the object is |
+//! | `extent`, `bounds` | the box that holds the object, and how it is found |
 //! | `start` | visual hull, fused depth |
 //! | `hollow` | hollows that no silhouette shows, by colour |
 //! | `simple` | nodes that may change sides: no wall is pierced |
@@ -19,6 +19,7 @@
 //! | `view` | whole pictures of the field |
 //! | `appearance` | splats on the surface, trained on the views |
 //! | `neighbours` | which corners of a surface are beside each other |
+//! | `corners` | which views show the corners of a surface, and in which colour |
 //! | `evidence` | what views show of the surface, and whether they say where it is |
 //! | `walls` | walls that are thin for the grid |
 //! | `judge` | held-out views, and what a person should know |
@@ -29,7 +30,9 @@ mod appearance;
 mod band;
 mod bounds;
 mod colours;
+mod corners;
 mod evidence;
+mod extent;
 mod hollow;
 mod judge;
 mod learn;

@@ -5,7 +5,7 @@
 //! shows all of the object, and has nothing of it beside the picture. Fusion: mean of truncated distances along the rays (Curless and Levoy 1996), weighted by the
 //! variance of depth, which grows with its fourth power.
 
-use super::bounds::Bounds;
+use super::extent::Bounds;
 use crate::field::Grid;
 use crate::scan::Frame;
 use crate::sweep;

@@ -3,7 +3,7 @@
 
 use super::adam::Adam;
 use super::band::Band;
-use super::bounds::Bounds;
+use super::extent::Bounds;
 use super::learn::State;
 use super::pictures::Pictures;
 use super::pool::Pixel;

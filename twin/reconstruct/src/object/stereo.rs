@@ -4,7 +4,7 @@
 //! What is compared is the variance of the views' colours about a place: even parts of a picture say nothing about depth and have none
 //! that counts beside the edges around them, whose variance their neighbours on the surface take over.
 
-use super::evidence;
+use super::corners;
 use super::neighbours::Neighbours;
 use crate::field::Field;
 use crate::mesh::Mesh;
@@ -71,8 +71,8 @@ impl<'a> Stereo<'a> {
     /// Whether the views do not say where each corner of a mesh on the surface of `field` is: they agree better at one of the `tried` depths
     /// behind it, or as well at all of them.
     pub(super) fn ambiguous(&self, field: &Field<f32>, mesh: &Mesh, tried: usize) -> Vec<bool> {
-        let normals = evidence::normals(mesh);
-        let seen = evidence::seen_by((field, mesh, &normals), (self.frames, self.poses));
+        let normals = corners::normals(mesh);
+        let seen = corners::seen_by((field, mesh, &normals), (self.frames, self.poses));
         let variances = self.variances((field, mesh), &Neighbours::of(mesh), &seen, tried);
         let is_ambiguous = |(variances, seen): (&Vec<Option<Variance>>, &Vec<u16>)| {
             let is_certain = matches!(best(variances, seen.len()), Best::At([0, last]) if last + 1 < tried);
@@ -84,9 +84,9 @@ impl<'a> Stereo<'a> {
     /// How far behind each corner of a mesh on the surface of `field` the views agree best [step], of `tried` depths of which the
     /// surface's own is the first; 0 where they do so on it, or say nothing.
     pub(super) fn depths(&self, field: &Field<f32>, mesh: &Mesh, tried: usize) -> Vec<f64> {
-        let normals = evidence::normals(mesh);
+        let normals = corners::normals(mesh);
         let neighbours = Neighbours::of(mesh);
-        let seen = evidence::seen_by((field, mesh, &normals), (self.frames, self.poses));
+        let seen = corners::seen_by((field, mesh, &normals), (self.frames, self.poses));
         let variances = self.variances((field, mesh), &neighbours, &seen, tried);
         let best: Vec<Best> = variances.iter().zip(&seen).map(|(all, seen)| best(all, seen.len())).collect();
         // What fills a hollow is smaller than what is around it: views that agree hardly anywhere cannot be compared by colour.
@@ -108,7 +108,7 @@ impl<'a> Stereo<'a> {
         seen: &[Vec<u16>],
         tried: usize,
     ) -> Vec<Vec<Option<Variance>>> {
-        let (normals, step) = (evidence::normals(mesh), STEP * field.grid.voxel);
+        let (normals, step) = (corners::normals(mesh), STEP * field.grid.voxel);
         let mut variances = vec![Vec::with_capacity(tried); mesh.points.len()];
         for number in 0..tried {
             let variance = |corner: usize| {
@@ -146,7 +146,7 @@ impl View {
     fn of((frame, pose): (&Frame, &Isometry3<f64>), by: u32) -> Self {
         let camera = frame.camera.reduced(by);
         let width = camera.width as usize;
-        let colour = |at: usize| evidence::mean(frame, [at % width, at / width], by).map(|c| c.map(|c| c as f32));
+        let colour = |at: usize| corners::mean(frame, [at % width, at / width], by).map(|c| c.map(|c| c as f32));
         let colour = (0..width * camera.height as usize).map(colour).collect();
         Self { camera, camera_from_scan: pose.inverse(), colour }
     }

@@ -2,7 +2,8 @@
 //! edges of the object. A person or the scan says where the table is, or it is the plane through what lies around the object, where depth
 //! was measured or COLMAP has placed points.
 
-use super::bounds::{Bounds, Misplaced};
+use super::bounds::Misplaced;
+use super::extent::Bounds;
 use super::pictures::Pictures;
 use crate::field::Field;
 use crate::remark::Remark;

@@ -1,6 +1,7 @@
 //! Walls that are thin for the grid: with fewer nodes across than these, tunnels and a wall's thickness are the grid's rather than the
 //! object's.
 
+use super::corners;
 use super::evidence;
 use crate::field::Field;
 use crate::mesh::Mesh;
@@ -33,7 +34,7 @@ impl ThinWalls {
             // The corner itself may lie outside by the tolerance of the triangles.
             depths.skip_while(|depth| *depth < 2.0 * STEP).find(|depth| is_outside(*depth))
         };
-        let normals = evidence::normals(mesh);
+        let normals = corners::normals(mesh);
         let thickness: Vec<Option<f64>> = normals.iter().enumerate().map(|(corner, n)| through(corner, n)).collect();
         Self {
             share: evidence::share(mesh, |corner| thickness[corner].is_some()),
