@@ -215,7 +215,7 @@ fn what_an_engine_cannot_be_used_for_is_refused() {
     let cell = Cell::shipped();
     session(&cell, "");
     let line = engine("");
-    for (more, says) in [("--torques", "cannot be used with"), ("--engine-limit=0", "0 is not in")] {
+    for (more, says) in [("--torques", "cannot be used with"), ("--engine-limit=0", "from 1 to 86400")] {
         let refused = calibration(&cell, &["diagnose", "SESSION", "--engine", &line, more]);
         assert_eq!(refused.status.code(), Some(2), "{}", refused.stderr);
         assert!(refused.stderr.contains(says), "{more}: {}", refused.stderr);

@@ -27,7 +27,7 @@ fn wrong_arguments_exit_with_2_and_say_what_is_allowed() {
     let common = ["capture", "excitation", "--cell", "cell.toml", "--out", "session", "--clips"];
     let viewpoint = ["viewpoint", "photo.png"];
     let cases: [(&[&str], &[&str], &str); 7] = [
-        (&common, &["0"], "1..=1000"),
+        (&common, &["0"], "from 1 to 1000"),
         (&common, &["1", "--amplitude", "7"], "from 0.01 to 1.5 [rad]"),
         (&common, &["1", "--duration", "nan"], "from 2 to 600 [s]"),
         (&common, &["1", "--frequency", "0.2", "1e9"], "from 0.05 to 50 [Hz]"),

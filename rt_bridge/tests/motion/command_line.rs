@@ -44,8 +44,8 @@ fn a_number_with_a_unit_is_refused_outside_of_its_range_which_is_told() {
         (&["grip", "move", "0.04"], "--speed=inf", "from 0.001 to 1 [m/s]"),
         (&run, "--duration=-1", "from 0.001 to 10000000 [s]"),
         (&["record", "--out", "clip.mcap"], "--wait=1e30", "from 0.001 to 10000000 [s]"),
-        (&serve, "--port=65536", "0..=65535"),
-        (&serve, "--hand-port=-1", "0..=65535"),
+        (&serve, "--port=65536", "from 0 to 65535"),
+        (&serve, "--hand-port=-1", "from 0 to 65535"),
     ];
     for (common, wrong, allowed) in cases {
         let end = rt_bridge(&[common, &[wrong]].concat());

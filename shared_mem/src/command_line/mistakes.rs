@@ -21,7 +21,8 @@ pub(super) fn text(error: &Error, whole: &Command, words: &[String]) -> String {
         }
     }
     if wrong.starts_with('-') {
-        return format!("error: {name}: `{wrong}` is no verb; `{} --help` lists all of them\n", whole.get_name());
+        let whole = whole.get_name();
+        return format!("error: `{wrong}` is no verb of `{whole}`; `{whole} --help` lists all of them\n");
     }
     let verbs: Vec<&str> = command.get_subcommands().map(Command::get_name).filter(|verb| *verb != "help").collect();
     let verbs = verbs.join(", ");
@@ -73,7 +74,7 @@ mod tests {
         );
         assert_eq!(
             said(&["calibration", "help", "--help"]),
-            "error: calibration: `--help` is no verb; `calibration --help` lists all of them\n"
+            "error: `--help` is no verb of `calibration`; `calibration --help` lists all of them\n"
         );
         assert!(said(&["calibration", "identify", "objet"]).contains("'object'"), "the nearest is proposed");
     }
