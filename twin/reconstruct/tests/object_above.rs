@@ -119,6 +119,7 @@ fn depth_around_a_block_says_where_its_base_is() {
 }
 
 #[test]
+#[ignore = "takes a minute: cargo test --release --workspace --test object_above -- --ignored"]
 fn without_depth_a_table_is_stated_or_the_tip_is_named() {
     let object = made(false, &json!({ "table": [0, 0, 3, 3.0 * TABLE] }), None).expect("an object");
     assert_eq!(object.support.map(|support| support.source), Some(TableSource::Scan));

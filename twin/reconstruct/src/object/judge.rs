@@ -21,8 +21,8 @@ use splat::SplatCloud;
 const EDGE: i16 = 3;
 /// For depth that is expected, pictures of fewer pixels do.
 const COARSER: u32 = 6;
-/// A tip that is higher is named [voxel]: the lowest corners that views show are known to a voxel or two.
-const TIP: f64 = 2.0;
+/// A tip that is higher is named [voxel]: the lowest corners that views show are known to a voxel.
+const TIP: f64 = 1.0;
 /// What colours are compared with behind the surface [voxel].
 const DEEPER: f64 = 2.0;
 /// Thin walls on more of the surface are named [1]: edges of thick parts have some.
