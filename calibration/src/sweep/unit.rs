@@ -2,7 +2,8 @@
 
 use super::SweepError;
 use serde::{Deserialize, Serialize};
-use shared_mem::input;
+use shared_mem::input::{self, InputError};
+use std::io::ErrorKind;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -58,11 +59,13 @@ impl FromStr for Slice {
 /// [`SweepError`] when there is no plan, or it is damaged.
 pub fn read(sweep: &Path) -> Result<Vec<Unit>, SweepError> {
     let file = sweep.join(UNITS);
-    if !file.exists() {
-        let what = "no sweep is planned there; plan one with `calibration sweep plan COMMANDS --out FOLDER`".to_owned();
-        return Err(SweepError::Content { file: sweep.to_owned(), what });
-    }
-    let text = input::text(&file, input::Kind::List)?;
+    let text = input::text(&file, input::Kind::List).map_err(|error| match error {
+        InputError::Io { source, .. } if source.kind() == ErrorKind::NotFound => SweepError::Content {
+            file: sweep.to_owned(),
+            what: "no sweep is planned there; plan one with `calibration sweep plan COMMANDS --out FOLDER`".to_owned(),
+        },
+        other => other.into(),
+    })?;
     let content = |what: String| SweepError::Content { file: file.clone(), what };
     let mut units: Vec<Unit> = Vec::new();
     for (i, line) in text.lines().enumerate() {

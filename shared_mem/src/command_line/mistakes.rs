@@ -29,25 +29,19 @@ pub(super) fn text(error: &Error, whole: &Command, words: &[String]) -> String {
     format!("error: `{wrong}` is no verb of `{name}`, which has {verbs}; `{name} --help` explains them\n")
 }
 
-/// `0 is not in 1..=1000` as a sentence.
+/// Where a line says `0 is not in 1..=1000`, that as a sentence.
 fn within(said: &str) -> String {
-    let mut text = String::with_capacity(said.len());
-    for line in said.split_inclusive('\n') {
-        match line
-            .trim_end()
-            .split_once(" is not in ")
-            .and_then(|(before, range)| Some((before, range.split_once("..")?)))
-        {
-            Some((before, (least, most))) => {
-                let begun = before.rfind(": ").map_or(before, |colon| &before[..colon]);
-                let most = most.trim_start_matches('=');
-                let from = if least.is_empty() { "0" } else { least };
-                text.push_str(&format!("{begun}: give a whole number from {from} to {most}\n"));
-            }
-            None => text.push_str(line),
-        }
-    }
-    text
+    said.split_inclusive('\n').map(|line| range(line).unwrap_or_else(|| line.to_owned())).collect()
+}
+
+fn range(line: &str) -> Option<String> {
+    // From behind, and whole numbers alone: what was typed stands in the line, too.
+    let (before, range) = line.trim_end().rsplit_once(" is not in ")?;
+    let (least, most) = range.split_once("..=")?;
+    let asked = before.rsplit_once(": ")?.0;
+    let least = if least.is_empty() { 0 } else { least.parse::<i128>().ok()? };
+    let most = most.parse::<i128>().ok()?;
+    Some(format!("{asked}: give a whole number from {least} to {most}\n"))
 }
 
 #[cfg(test)]
@@ -81,6 +75,8 @@ mod tests {
 
     #[test]
     fn a_number_outside_of_its_range_is_told_the_range() {
+        let typed = said(&["calibration", "identify", "arm", "--clips", "a is not in 1..=5"]);
+        assert!(typed.contains("invalid digit"), "{typed}");
         let text = said(&["calibration", "identify", "arm", "--clips", "0"]);
         assert!(
             text.starts_with("error: invalid value '0' for '--clips <clips>': give a whole number from 1 to 1000\n"),

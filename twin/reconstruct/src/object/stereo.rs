@@ -9,7 +9,7 @@ use super::neighbours::Neighbours;
 use crate::field::Field;
 use crate::mesh::Mesh;
 use crate::scan::{Camera, Frame};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 use shared_mem::ending;
 
@@ -73,7 +73,7 @@ impl<'a> Stereo<'a> {
     pub(super) fn ambiguous(&self, field: &Field<f32>, mesh: &Mesh, tried: usize) -> Vec<bool> {
         let normals = corners::normals(mesh);
         let seen = corners::seen_by((field, mesh, &normals), (self.frames, self.poses));
-        let variances = self.variances((field, mesh), &Neighbours::of(mesh), &seen, tried);
+        let variances = self.variances((field, mesh, &normals), &Neighbours::of(mesh), &seen, tried);
         let is_ambiguous = |(variances, seen): (&Vec<Option<Variance>>, &Vec<u16>)| {
             let is_certain = matches!(best(variances, seen.len()), Best::At([0, last]) if last + 1 < tried);
             !is_certain || variances.iter().all(Option::is_none)
@@ -87,7 +87,7 @@ impl<'a> Stereo<'a> {
         let normals = corners::normals(mesh);
         let neighbours = Neighbours::of(mesh);
         let seen = corners::seen_by((field, mesh, &normals), (self.frames, self.poses));
-        let variances = self.variances((field, mesh), &neighbours, &seen, tried);
+        let variances = self.variances((field, mesh, &normals), &neighbours, &seen, tried);
         let best: Vec<Best> = variances.iter().zip(&seen).map(|(all, seen)| best(all, seen.len())).collect();
         // What fills a hollow is smaller than what is around it: views that agree hardly anywhere cannot be compared by colour.
         if 2 * best.iter().filter(|best| **best == Best::Nowhere).count() > best.len() {
@@ -103,12 +103,12 @@ impl<'a> Stereo<'a> {
     /// Of each corner and those around it, at so many depths behind it.
     fn variances(
         &self,
-        (field, mesh): (&Field<f32>, &Mesh),
+        (field, mesh, normals): (&Field<f32>, &Mesh, &[Vector3<f64>]),
         neighbours: &Neighbours,
         seen: &[Vec<u16>],
         tried: usize,
     ) -> Vec<Vec<Option<Variance>>> {
-        let (normals, step) = (corners::normals(mesh), STEP * field.grid.voxel);
+        let step = STEP * field.grid.voxel;
         let mut variances = vec![Vec::with_capacity(tried); mesh.points.len()];
         for number in 0..tried {
             let variance = |corner: usize| {
