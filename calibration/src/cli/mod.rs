@@ -43,7 +43,7 @@ Examples:
   calibration check session --report check.html
   calibration identify arm session --out theta.toml --report page.html
   calibration diagnose session --report report.html
-  calibration viewpoint session --out cell.toml --report outline.png
+  calibration viewpoint session --out cell.toml --picture outline.png
   calibration hand-eye board --board 5x7,0.034,0.028,DICT_5X5_100 --out hand_eye.toml
   calibration import last_week --out session
   calibration init --urdf arm.urdf --out cell.toml

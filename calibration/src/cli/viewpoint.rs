@@ -17,7 +17,7 @@ use vision::viewpoint::search::Reach;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  calibration viewpoint session --out cell.toml --report outline.png
+  calibration viewpoint session --out cell.toml --picture outline.png
   calibration viewpoint photo.jpg --joints 0,-0.78,0,-2.36,0,1.57,0.79 --cell cell.toml --start 1.4,0.8,0.9,0.26,-0.37,-0.73,0.51
   calibration viewpoint a.png b.png --joints a.json --joints b.json --mask ma.png --mask mb.png --start search --json
 A joint file is JSON: a list of positions, or an object with `q`; `K`, `D`, `width`, `height` beside it are intrinsics as ROS names them.")]
@@ -65,9 +65,9 @@ pub struct ViewpointArguments {
     /// outline: least squares on the outline; swarm: the paper's particle swarm on the silhouettes.
     #[arg(long, value_enum, default_value_t = MethodName::Outline)]
     method: MethodName,
-    /// Pictures drawn by the swarm, for each frame.
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(40..=1_000_000))]
-    budget: u32,
+    /// Points that the swarm tries, for each of which every frame is drawn.
+    #[arg(long = "points", alias = "budget", value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(40..=1_000_000))]
+    points: u32,
     /// At most so many pictures of a session.
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=100))]
     frames: u8,
@@ -80,12 +80,12 @@ pub struct ViewpointArguments {
     /// Writes the cell with the pose found.
     #[arg(long, value_name = "CELL.TOML")]
     out: Option<PathBuf>,
-    /// Replaces the files of --out and --report; of a cell.toml, all but the camera's block stays.
+    /// Replaces the files of --out and --picture; of a cell.toml, all but the camera's block stays.
     #[arg(long)]
     force: bool,
     /// Writes the pictures with the outline (red: found, green: start) as a PNG.
-    #[arg(long, value_name = "PICTURE.PNG")]
-    report: Option<PathBuf>,
+    #[arg(long, alias = "report", value_name = "PICTURE.PNG")]
+    picture: Option<PathBuf>,
     /// Prints the answer as one JSON object.
     #[arg(long)]
     json: bool,
@@ -140,9 +140,9 @@ pub(super) fn run(arguments: ViewpointArguments, interrupt: &Interrupt) -> anyho
     };
     let method = match arguments.method {
         MethodName::Outline => Method::Outline,
-        MethodName::Swarm => Method::Swarm(arguments.budget as usize),
+        MethodName::Swarm => Method::Swarm(arguments.points as usize),
     };
-    Destination::apart(&[arguments.out.as_deref(), arguments.report.as_deref()])?;
+    Destination::apart(&[arguments.out.as_deref(), arguments.picture.as_deref()])?;
     let options = Options {
         targets,
         cell,
@@ -162,7 +162,7 @@ pub(super) fn run(arguments: ViewpointArguments, interrupt: &Interrupt) -> anyho
         hand: arguments.hand.map_or(Hand::None, |width| Hand::Franka { width }),
         seed: arguments.seed,
         out: Destination::of(arguments.out.as_deref(), arguments.force)?,
-        report: Destination::of(arguments.report.as_deref(), arguments.force)?,
+        report: Destination::of(arguments.picture.as_deref(), arguments.force)?,
     };
     let found = find(&options, interrupt)?;
     print(arguments.json, &found, in_words(&found))

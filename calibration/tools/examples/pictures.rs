@@ -93,7 +93,7 @@ const DRAWN: [Drawn; 5] = [
     Drawn {
         by: &[
             "calibration capture excitation --cell fr3 --arm sim --clips 1 --out seen",
-            "calibration viewpoint seen --color --report outline.png",
+            "calibration viewpoint seen --color --picture outline.png",
         ],
         file: "outline.png",
         shows: None,

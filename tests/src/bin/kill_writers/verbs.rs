@@ -122,7 +122,7 @@ fn answers(session: &str, cell: &str, strokes: &str) -> Vec<Verb> {
         ),
         verb(
             "viewpoint",
-            &format!("viewpoint {session} --frames 2 --out {{out}}/cell.toml --report {{out}}/outline.png --force"),
+            &format!("viewpoint {session} --frames 2 --out {{out}}/cell.toml --picture {{out}}/outline.png --force"),
             &["cell.toml", "outline.png"],
         ),
         verb("preview", &format!("{stroke} --preview {{out}}/next.svg --force"), &["next.svg"]).times(3, 1),
