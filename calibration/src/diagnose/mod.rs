@@ -186,9 +186,9 @@ impl Question for Cause<'_> {
 
     fn examine(&self, bench: &Bench<'_>) -> Result<Diagnosis, DiagnoseError> {
         let Self { session, admitted, split, options } = self;
-        let bar = Progress::planned(
+        let bar = Progress::searching(
             "diagnose",
-            &fit::stages::plan(admitted.with_object),
+            &fit::stages::expected(admitted.with_object),
             search::baseline::steps(admitted.with_object),
         );
         let baseline = Baseline { bench, split, cell: &session.cell, admitted };

@@ -68,11 +68,6 @@ impl Estimate {
         self.current = Stage { name, planned, begun: now, steps, done: 0, last: now };
     }
 
-    /// Stages come next that were not planned.
-    pub(super) fn insert(&mut self, stages: &[Planned]) {
-        stages.iter().rev().for_each(|stage| self.ahead.push_front(*stage));
-    }
-
     /// So many steps of the stage at work are done.
     pub(super) fn done(&mut self, done: u64, now: Duration) {
         if done != self.current.done {
@@ -197,17 +192,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn what_comes_on_top_holds_the_share_where_it_is() {
-        let mut work = Estimate::new(&[("fits", 1.0), ("conclusion", 0.5)], 1);
-        work.done(1, seconds(100.0));
-        work.begin("conclusion", 1, seconds(100.0));
-        let (before, _) = work.at(seconds(140.0));
-        work.insert(&[("fits", 1.0)]);
-        let (after, left) = work.at(seconds(141.0));
-        assert!(after >= before && left.expect("an estimate") > seconds(100.0), "{before} {after} {left:?}");
     }
 
     #[test]

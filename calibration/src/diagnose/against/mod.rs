@@ -136,9 +136,9 @@ impl Question for Changed<'_> {
         let split = split_of(&admitted.groups, pair.first_of_b, options.seed);
         let of_a = of_a(&split, pair.first_of_b);
         let (slopes, changes) = (stages::SLOPES, stages::CHANGES);
-        let further = stages::planned(&[slopes, changes, slopes, changes, stages::CONCLUSION]);
-        let plan = [stages::plan(admitted.with_object), further].concat();
-        let bar = Progress::planned("diagnose", &plan, baseline::steps(admitted.with_object));
+        let of_pair = [slopes, changes, slopes, changes, stages::CONCLUSION];
+        let expected = [&stages::expected(admitted.with_object)[..], &of_pair].concat();
+        let bar = Progress::searching("diagnose", &expected, baseline::steps(admitted.with_object));
         let baseline = Baseline { bench, split: &of_a, cell, admitted };
         let begun = baseline.identified(&bar).ok_or(DiagnoseError::NoBaseline)?;
         let on_a = if is_explained(bench, &of_a, &begun) {

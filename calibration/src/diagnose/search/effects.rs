@@ -67,7 +67,7 @@ impl Selection for Search<'_> {
                 return untried(near, &from, first).map(ended);
             }
             if first.is_some() || restarts > 0 {
-                self.bar.insert(&stages::further());
+                self.bar.insert(&stages::FURTHER);
             }
             let Some(step) = tried(near, &from, (first, &worse)) else {
                 // Cut short by its budget: what was found before stands.
@@ -160,7 +160,7 @@ fn tried(search: &Search<'_>, from: &Hypothesis, (first, worse): (Option<&Step>,
         return Some(step);
     }
     let rest: Vec<usize> = overlooked(bench, &step).into_iter().filter(|rest| !worse.contains(rest)).collect();
-    search.bar.insert(&stages::planned(&[stages::FITS, stages::LAST_FITS]));
+    search.bar.insert(&[stages::FITS, stages::LAST_FITS]);
     Some(fitted(search, step, &rest, true))
 }
 
