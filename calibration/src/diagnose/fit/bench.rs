@@ -12,7 +12,6 @@ use inference::likelihood::random_effects::{OwnNumbers, RandomEffects, WithOwn};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
-use twin::effects::{EffectInfo, Parameter, Place, Role};
 
 /// What every step of the diagnosis is given.
 pub struct Bench<'a, O: OwnNumbers = WithOwn> {
@@ -120,26 +119,8 @@ impl<V> Hypothesis<V> {
     }
 }
 
-/// An effect weaker than this share of the strongest that is plausible is none: two engines with other steps and other
-/// rules of integration differ by as much (0.35 % of a rotor's inertia and 0.02 % of viscous friction, measured on sessions
-/// of another engine with nothing wrong).
-const NEGLIGIBLE_SHARE: f64 = 0.008;
-/// A control period and a half [s].
-const DELAY_OF_CONVENTION: f64 = 1.5e-3;
 /// Steps in which a clip finds its nuisance parameters.
 const PROFILE_STEPS: usize = 2;
-
-/// Share of the strongest from which on an effect counts. What fades out towards infinity, as a gear's stiffness, is met
-/// in practice from the far end of its plausible range on; beyond, it is the ordinary stiffness of anything.
-fn least(effect: &EffectInfo) -> f64 {
-    let fades = effect.parameters.iter().find(|parameter| parameter.resting_value().is_infinite());
-    match fades {
-        Some(parameter) if matches!(parameter.role, Role::Size { .. }) => {
-            parameter.plausible[0] / parameter.plausible[1]
-        }
-        _ => NEGLIGIBLE_SHARE,
-    }
-}
 
 impl<O: OwnNumbers> Bench<'_, O> {
     /// Numbers that are free when these effects act.
@@ -291,42 +272,6 @@ impl<O: OwnNumbers> Bench<'_, O> {
         Some(clips)
     }
 
-    /// Whether an effect of a hypothesis is so weak that any two simulations differ as much.
-    pub fn negligible(&self, effect: usize, full: &[f64]) -> bool {
-        let candidate = &self.library.candidates[effect];
-        let shares = candidate.sizes.iter().filter_map(|size| {
-            let resting = self.library.unknowns[*size].start;
-            let strongest = candidate.strongest(*size, resting)?;
-            Some(((full[*size] - resting) / (strongest - resting)).abs())
-        });
-        shares.fold(0.0, f64::max) < least(candidate.effect)
-    }
-
-    /// Whether an effect of a hypothesis is every engine's own: what any two of them differ by.
-    pub fn is_convention(&self, effect: usize, hypothesis: &Hypothesis<O>) -> bool {
-        self.is_a_period_more(effect, hypothesis) || self.is_of_engines(effect, &hypothesis.full)
-    }
-
-    /// Whether all of an effect lies where it does in engines in which nothing is wrong.
-    fn is_of_engines(&self, effect: usize, full: &[f64]) -> bool {
-        let candidate = &self.library.candidates[effect];
-        // Such effects have parameters of one number each.
-        let lies = |(k, parameter): (usize, &Parameter)| {
-            parameter.of_engines.is_some_and(|[low, high]| (low..=high).contains(&full[k]))
-        };
-        candidate.numbers.clone().zip(candidate.effect.parameters).all(lies)
-    }
-
-    /// Whether an effect does no more to commands that another changes already than shift them by a control period: from which
-    /// period on a filtered command acts differs.
-    fn is_a_period_more(&self, effect: usize, hypothesis: &Hypothesis<O>) -> bool {
-        let of_commands = |k: &usize| self.library.candidates[*k].effect.acts_on == Place::CommandPath;
-        let weak = |size: &usize| hypothesis.full[*size] - self.library.unknowns[*size].start < DELAY_OF_CONVENTION;
-        of_commands(&effect)
-            && hypothesis.effects.iter().any(|other| *other != effect && of_commands(other))
-            && self.library.candidates[effect].sizes.iter().all(weak)
-    }
-
     /// The sum of fitted clips' forms, numbers held to their known ranges.
     pub fn held(&self, hypothesis: &Hypothesis<O>) -> DMatrix<f64> {
         let size = 1 + hypothesis.free.len();
@@ -345,38 +290,4 @@ struct Polar {
     across: f64,
     /// The angle at which the size acts across.
     quarter: f64,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::diagnose::test_bench::{on_strokes, shipped};
-    use worlds::world::{Fault, Kind, World};
-
-    #[test]
-    fn an_effect_that_lies_where_any_engine_has_it_is_no_cause() {
-        let cell = shipped();
-        on_strokes((&cell, &World::draw(3, Kind::Strokes, Fault::Nothing, &cell)), |bench, _| {
-            let mut with_a_range = 0;
-            for (effect, candidate) in bench.library.candidates.iter().enumerate() {
-                let at = |share: f64| {
-                    let mut full = bench.library.start();
-                    for (k, parameter) in candidate.numbers.clone().zip(candidate.effect.parameters) {
-                        full[k] = parameter.of_engines.map_or(full[k], |[low, high]| low + share * (high - low));
-                    }
-                    let hypothesis = Hypothesis { effects: vec![effect], full, free: Vec::new(), fitted: Vec::new() };
-                    bench.is_convention(effect, &hypothesis)
-                };
-                let ranges = candidate.effect.parameters.iter().all(|parameter| parameter.of_engines.is_some());
-                assert_eq!(
-                    [0.01, 0.5, 0.99, 1.01].map(at),
-                    [ranges, ranges, ranges, false],
-                    "{}",
-                    candidate.effect.name
-                );
-                with_a_range += usize::from(ranges);
-            }
-            assert!(with_a_range > 0);
-        });
-    }
 }

@@ -43,9 +43,8 @@ pub fn of_effect_moved(
                 continue;
             }
             let value = hypothesis.full[k];
+            let half = spread.half_width_of(bench, hypothesis, effect, k);
             let place = hypothesis.free.iter().position(|free| *free == k);
-            let rough_step = (!candidate.is_of_arm()).then(|| bench.library.unknowns[k].step);
-            let half = place.map_or(0.0, |place| spread.half_width(&[(place, 1.0)], rough_step, LEVEL));
             let moved = place.and_then(|place| time_step.get(place)).copied().unwrap_or(0.0);
             let unknown = candidate.sizes.contains(&k) || candidate.held.contains(&k);
             let open = unknown && !hypothesis.free.contains(&k);
@@ -83,6 +82,19 @@ impl Spread {
     pub(in crate::diagnose) fn of<O: OwnNumbers>(bench: &Bench<'_, O>, hypothesis: &Hypothesis<O>) -> Self {
         let clips = hypothesis.fitted.iter().map(|clip| &clip.reduced.form);
         Self(Jackknife::new(&bench.held(hypothesis), clips))
+    }
+
+    /// Half the interval of a number of one of the effects, 0 where it is not free.
+    pub(in crate::diagnose) fn half_width_of<O: OwnNumbers>(
+        &self,
+        bench: &Bench<'_, O>,
+        hypothesis: &Hypothesis<O>,
+        effect: usize,
+        number: usize,
+    ) -> f64 {
+        let rough_step = (!bench.library.candidates[effect].is_of_arm()).then(|| bench.library.unknowns[number].step);
+        let place = hypothesis.free.iter().position(|free| *free == number);
+        place.map_or(0.0, |place| self.half_width(&[(place, 1.0)], rough_step, LEVEL))
     }
 
     /// Half the interval, at `level`, of a sum of numbers, by their places among the free ones, each times a factor. `rough_step`: the
