@@ -26,7 +26,7 @@ pub(in crate::diagnose) fn of(stage: &str, candidate: &str) -> String {
 }
 
 /// What a further step of the search adds.
-pub(in crate::diagnose) const FURTHER: [&str; 3] = [SIGNATURES, FITS, LAST_FITS];
+pub(in crate::diagnose) const OF_A_STEP: [&str; 3] = [SIGNATURES, FITS, LAST_FITS];
 
 /// A search that finds one effect.
 pub(in crate::diagnose) fn expected(with_object: bool) -> Vec<&'static str> {

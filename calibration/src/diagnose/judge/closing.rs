@@ -21,50 +21,31 @@ pub struct Closed {
     pub most: f64,
     /// Of the groups that have a gap: how joints yield in contact, any two engines differ by.
     pub of_gap: f64,
-    /// Of the mean over clips of what they leave of the object. A table that leans sends an object far in some headings and hardly in
-    /// others; a clip like most, under the contact of another engine, shows little of it.
-    pub of_mean: f64,
 }
 
 #[cfg(test)]
 impl Closed {
     /// The same with and without the joints in contact.
     pub fn all(share: f64) -> Self {
-        Self { most: share, of_gap: share, of_mean: share }
+        Self { most: share, of_gap: share }
     }
-}
-
-/// How much of the way is gone on some clips.
-struct Ways {
-    /// Of each group of sensors that has a gap, in a clip like most.
-    groups: Vec<f64>,
-    /// The same of the joints in contact.
-    contact: f64,
-    /// Of the object, in the mean over clips.
-    mean: f64,
 }
 
 /// What closes; `whole`: what the baseline leaves.
 pub fn closes(bench: &Bench<'_>, split: &Split, whole: &[Typical], hypotheses: [&Hypothesis; 2]) -> Closed {
-    let on = |clips: &[usize]| -> Option<Ways> {
+    let on = |clips: &[usize]| -> Option<Vec<f64>> {
         let [before, after] = hypotheses.map(|hypothesis| Residuals::at(bench, hypothesis, clips));
         let (before, after) = (before?, after?);
         let left = SensorGap::of_groups(&before.typical(), &after.typical());
-        let way_of = |[before, after]: [Option<Typical>; 2]| {
-            let (before, after) = before.zip(after)?;
-            Some(way(before.mean_square, after.mean_square, before.floor))
-        };
-        Some(Ways {
-            groups: left.iter().zip(whole).map(|(left, whole)| share(left, whole.mean_square)).collect(),
-            contact: way_of([&before, &after].map(|left| left.typical_of(Group::Contact))).unwrap_or(0.0),
-            mean: way_of([&before, &after].map(Residuals::mean_of_object)).unwrap_or(0.0),
-        })
+        let shares = left.iter().zip(whole).map(|(left, whole)| share(left, whole.mean_square));
+        let in_contact = before.typical_of(Group::Contact).zip(after.typical_of(Group::Contact));
+        let contact = in_contact.map(|(before, after)| way(before.mean_square, after.mean_square, before.floor));
+        Some(shares.chain(contact).collect())
     };
     let (Some(all), Some(choose)) = (on(&split.searched()), on(split.elsewhere())) else { return Closed::default() };
-    let harmless = |all: f64, choose: f64| if choose > -MIN_SHARE_CLOSED { all.max(0.0) } else { 0.0 };
-    let of_gap = all.groups.iter().zip(&choose.groups).map(|(all, choose)| harmless(*all, *choose)).fold(0.0, f64::max);
-    let most = of_gap.max(harmless(all.contact, choose.contact));
-    Closed { most, of_gap, of_mean: harmless(all.mean, choose.mean) }
+    let harmless = |(_, choose): &(&f64, &f64)| **choose > -MIN_SHARE_CLOSED;
+    let most = |of: &[f64]| of.iter().zip(&choose).filter(harmless).map(|(all, _)| *all).fold(0.0, f64::max);
+    Closed { most: most(&all), of_gap: most(&all[..whole.len().min(all.len())]) }
 }
 
 /// How much of the way from the gap down to noise is gone, on a logarithmic scale.

@@ -123,14 +123,7 @@ impl Residuals {
         self.typical_among(&(0..self.clips.len()).collect::<Vec<_>>(), group)
     }
 
-    /// The object's group by the mean over clips instead, see the head; `None` where no clip has any of it.
-    pub fn mean_of_object(&self) -> Option<Typical> {
-        let [mean_square, floor] =
-            [&self.sums, &self.floors].map(|sums| mean_of_group(&sums.iter().collect::<Vec<_>>(), Group::Object));
-        Some(Typical { mean_square: mean_square?, floor: floor?, of_object: true })
-    }
-
-    /// The same as [`Self::typical_of`] among some clips, by their places.
+    /// The same among some clips, by their places.
     fn typical_among(&self, places: &[usize], group: Group) -> Option<Typical> {
         let usual =
             |sums: &[Sums]| geometric_mean(places.iter().filter_map(|place| sums[*place][group as usize].mean()));

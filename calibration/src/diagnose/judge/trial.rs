@@ -59,7 +59,7 @@ impl Trial {
 
     /// Whether enough of the gap closes with it for a cause, however much better the clips are predicted, or it shows beside that.
     pub fn is_cause(&self) -> bool {
-        self.closed.most.max(self.closed.of_mean) > MIN_SHARE_CLOSED || self.shows_beside_contact()
+        self.closed.most > MIN_SHARE_CLOSED || self.shows_beside_contact()
     }
 
     /// Whether it shows apart from the gap that contact leaves: a single stage shows it, or it is of the camera and nearly all clips
@@ -214,12 +214,11 @@ impl Step {
                 let name = bench.library.name(fit.effects.last().copied().unwrap_or_default());
                 let ranks = gain.rank_sigmas();
                 tracing::debug!(
-                    "{name}: {:.0} +- {:.0} nats, {:.0} % of clips, ranks {ranks:.1} sigma, closes {:.2}, {:.2} in the mean",
+                    "{name}: {:.0} +- {:.0} nats, {:.0} % of clips, ranks {ranks:.1} sigma, closes {:.2}",
                     gain.nats,
                     gain.error,
                     100.0 * gain.share,
-                    closed.most,
-                    closed.of_mean
+                    closed.most
                 );
                 let trial = &mut self.trials[place];
                 trial.closed = closed;

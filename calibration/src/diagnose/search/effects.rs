@@ -67,7 +67,7 @@ impl Selection for Search<'_> {
                 return untried(near, &from, first).map(ended);
             }
             if first.is_some() || restarts > 0 {
-                self.bar.insert(&stages::FURTHER);
+                self.bar.insert(&stages::OF_A_STEP);
             }
             let Some(step) = tried(near, &from, (first, &worse)) else {
                 // Cut short by its budget: what was found before stands.
