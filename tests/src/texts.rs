@@ -104,10 +104,11 @@ pub fn documents() -> Vec<(String, String)> {
 }
 
 /// The folders with the sources of the product.
-pub const PRODUCT: [&str; 17] = [
+pub const PRODUCT: [&str; 18] = [
     "shared_mem/src",
     "twin/splat/src",
     "twin/fusion/src",
+    "twin/depth/src",
     "twin/reconstruct/src",
     "twin/urdf/src",
     "twin/src",

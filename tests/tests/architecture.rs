@@ -251,6 +251,7 @@ fn the_page_of_the_house_names_every_folder_and_only_existing_files() {
         "twin/",
         "twin/splat/",
         "twin/fusion/",
+        "twin/depth/",
         "twin/reconstruct/",
         "twin/urdf/",
         "twin/tasks/",

@@ -32,13 +32,14 @@ struct Crate {
 }
 
 /// The crates from the ground up: each needs those before it alone, and of them the listed ones.
-const CRATES: [Crate; 17] = [
+const CRATES: [Crate; 18] = [
     Crate { folder: "shared_mem", name: "shared_mem", needs: &[] },
     Crate { folder: "shared_mem/import", name: "import", needs: &["shared_mem"] },
     Crate { folder: "twin/urdf", name: "urdf_rs", needs: &[] },
     Crate { folder: "twin/splat", name: "splat", needs: &["shared_mem"] },
     Crate { folder: "twin/fusion", name: "fusion", needs: &["splat"] },
-    Crate { folder: "twin/reconstruct", name: "reconstruct", needs: &["fusion", "shared_mem", "splat"] },
+    Crate { folder: "twin/depth", name: "depth", needs: &["shared_mem"] },
+    Crate { folder: "twin/reconstruct", name: "reconstruct", needs: &["depth", "fusion", "shared_mem", "splat"] },
     Crate { folder: "twin", name: "twin", needs: &["reconstruct", "shared_mem", "splat", "urdf_rs"] },
     Crate { folder: "rt_bridge/link", name: "link", needs: &["shared_mem"] },
     Crate { folder: "rt_bridge", name: "rt_bridge", needs: &["link", "shared_mem", "twin"] },
