@@ -79,17 +79,17 @@ def cameras(count, rng):
         yield pose
 
 
-def scan(folder, views, seed=1):
-    """A scan with the noise of a real camera; in truth/ the depth of the held-out views and all poses."""
+def scan(folder, views, seed=1, depth=True):
+    """A scan with the noise of a real camera, with depth or without; in truth/ the depth of the held-out views and all poses."""
     rng = np.random.default_rng(seed)
     model = world(os.path.abspath(f"{folder}_world"), rng)
     renderers = [mujoco.Renderer(model, HEIGHT, WIDTH) for _ in range(2)]
     renderers[1].enable_depth_rendering()
     drawn = [(*draw(model, pose, renderers), pose) for pose in cameras(views, rng)]
-    record(drawn, folder, seed=seed)
-    for i, (_, depth, _, _) in enumerate(drawn):
+    record(drawn, folder, seed=seed, depth=depth)
+    for i, (_, z, _, _) in enumerate(drawn):
         if i % 8 == 4:
-            np.save(f"{folder}/truth/depth_{i:03}.npy", depth.astype(np.float32))
+            np.save(f"{folder}/truth/depth_{i:03}.npy", z.astype(np.float32))
 
 
 def held_out(folder):
@@ -99,6 +99,17 @@ def held_out(folder):
     for path in sorted(glob.glob(f"{folder}/truth/depth_*.npy")):
         name = path[-7:-4]
         yield name, np.array(poses[int(name)]), np.load(path)
+
+
+def shares_within(mesh, folder, share):
+    """Of the true depth of the held-out views, the share at which a mesh is off by at most this share of the distance."""
+    within, all_of_it = 0, 0
+    for _, pose, truth in held_out(folder):
+        known = (truth > 0) & (truth < FARTHEST)
+        depth = seen_depth(*mesh, pose)
+        within += (np.abs(depth - truth) <= share * truth)[known].sum()
+        all_of_it += known.sum()
+    return within / all_of_it
 
 
 def directions():

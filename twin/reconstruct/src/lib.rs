@@ -7,6 +7,7 @@
 //! | [`scan`] | pictures, masks, depth, poses; COLMAP, nerfstudio, robot-held cameras |
 //! | [`field`] | signed distance and colour at the nodes of a box |
 //! | `sweep` | signed distance from signs |
+//! | [`computed`] | depth of pictures that were taken without |
 //! | `closing` | gaps filled that are narrower than the grid shows |
 //! | [`views`] | views read, the blurred ones left out, every eighth held out |
 //! | `splats` | views as splats are trained on them, and the picture of splats |
@@ -21,6 +22,7 @@
 pub mod articulated;
 pub mod assets;
 mod closing;
+pub mod computed;
 pub mod field;
 pub mod mesh;
 pub mod object;

@@ -146,7 +146,8 @@ fn a_table_comes_out_of_its_pictures_at_its_height_with_splats_and_a_mesh_to_col
     assert!(table.plane.points > 5000, "{}", table.plane.points);
     let block = written(&scene, "cell_scene.toml").expect("a block");
     assert!(String::from_utf8(block).expect("text").contains("[table]\nheight = 0.0"));
-    assert!(scene.psnr() > 26.0 && scene.depth_off() < 3e-3, "{} dB, {} m", scene.psnr(), scene.depth_off());
+    let off = scene.depth_off().expect("depth of held-out views");
+    assert!(scene.psnr() > 26.0 && off < 3e-3, "{} dB, {off} m", scene.psnr());
     let read = SplatCloud::parse(&written(&scene, "splats.ply").expect("a file")).expect("splats");
     assert_eq!(read.splats.len(), scene.splats.splats.len());
     assert!(
@@ -248,6 +249,4 @@ fn scans_that_cannot_be_used_are_refused_in_a_line_that_says_what_is_missing() {
     );
     let remarks = made.expect("half of it").remarks;
     assert!(remarks.iter().any(|remark| remark.0.starts_with("16 views are blurred")), "{remarks:?}");
-    std::fs::rename(folder.path().join("depth"), folder.path().join("elsewhere")).expect("a folder");
-    assert!(refused().contains("no depth pictures"));
 }

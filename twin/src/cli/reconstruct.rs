@@ -7,7 +7,7 @@ use anyhow::{Context as _, ensure};
 use nalgebra::Point3;
 use reconstruct::assets::{self, Labels};
 use reconstruct::mesh::Mesh;
-use reconstruct::object::{self, Object, Options};
+use reconstruct::object::{self, Certainty, Object, Options};
 use reconstruct::scan::{Scan, Table};
 use reconstruct::scene;
 use shared_mem::quantity::{number, numbers};
@@ -39,7 +39,8 @@ enum What {
 #[command(after_help = "\
 A scan is a folder with pictures, masks of the object (masks/NAME.png, white is the object, or an alpha channel), and the poses:
 transforms.json of nerfstudio, a COLMAP model in sparse/0, or poses.json of a robot that held the camera. Depth pictures
-(depth/NAME.png, 16 bits, millimetres) make hollows and thin walls right, and give the scale. Forty to eighty pictures from all
+(depth/NAME.png, 16 bits, millimetres) make hollows and thin walls right, and give the scale; without any, depth is computed from the
+pictures where they have texture, in some minutes. Forty to eighty pictures from all
 around, above and below are good; every eighth is held out and shows in the report how good the result is.
 
 Of an object on a table no picture shows the underside: it is closed in the plane of the table, and that is said to be a guess. Depth
@@ -88,11 +89,12 @@ pub(crate) struct ObjectVerb {
 const LAST_OF_OBJECT: &str = "object.json";
 const LAST_OF_SCENE: &str = "scene.json";
 
-/// A scene out of pictures with depth: one surface, its table, splats, a mesh to collide with, a report.
+/// A scene out of pictures: one surface, its table, splats, a mesh to collide with, a report.
 #[derive(clap::Args)]
 #[command(after_help = "\
 A scan is a folder with pictures, depth pictures (depth/NAME.png, 16 bits, millimetres) and the poses: transforms.json of nerfstudio, a
-COLMAP model in sparse/0, or poses.json of a robot that held the camera. Masks are not needed. Views from around the scene that overlap
+COLMAP model in sparse/0, or poses.json of a robot that held the camera. Without any depth pictures depth is computed from the pictures
+where they have texture, and --scale says how long one unit of the poses is. Masks are not needed. Views from around the scene that overlap
 are good, fifty and more; every eighth is held out and shows in the report how good the result is.
 
 Writes scene.ply (the surface in colours), scene.obj (the same in fewer triangles, to collide with), splats.ply, scene.json (the table's
@@ -172,8 +174,11 @@ impl SceneVerb {
                 table.points
             )
         });
+        let depth = summary.computed_depth.map_or(String::new(), |share| {
+            format!("; depth computed from the pictures on {:.0} % of their pixels", 100.0 * share)
+        });
         format!(
-            "{}: {} triangles, {} to collide with, {} splats; {table}; held-out views {:.1} dB; see {}",
+            "{}: {} triangles, {} to collide with, {} splats{depth}; {table}; held-out views {:.1} dB; see {}",
             self.outputs.out.display(),
             summary.surface[1],
             summary.collision_triangles,
@@ -233,8 +238,15 @@ impl ObjectVerb {
         let base = object.support.map_or(String::new(), |support| {
             format!(" (its base, which no picture shows, closed in the plane of the table: {})", support.source.words())
         });
+        let depth = object.computed.map_or(String::new(), |computed| {
+            let guess = 100.0 * (object.share(Certainty::Ambiguous) + object.share(Certainty::Contradicted));
+            format!(
+                "; depth computed from the pictures on {:.0} % of the object's pixels, {guess:.0} % of the surface a guess for want of texture",
+                100.0 * computed.share
+            )
+        });
         format!(
-            "{}: {:.0} x {:.0} x {:.0} mm, {:.1} cm^3, closed{base}, genus {}, {} convex pieces; held-out views {:.1} dB inside the mask, \
+            "{}: {:.0} x {:.0} x {:.0} mm, {:.1} cm^3, closed{base}, genus {}, {} convex pieces{depth}; held-out views {:.1} dB inside the mask, \
              {:.1} dB by {} splats; see {}",
             self.outputs.out.display(),
             size.x,

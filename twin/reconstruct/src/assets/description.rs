@@ -85,6 +85,7 @@ mod tests {
             scale: Scale { metres: 1.0, source: ScaleSource::Given, spread: 0.0 },
             views: 52,
             with_depth: true,
+            computed_depth: None,
             cameras_moved_m: 0.0,
             held_out: Vec::new(),
             psnr_db: 33.0,

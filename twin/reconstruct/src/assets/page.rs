@@ -71,6 +71,10 @@ fn shape(summary: &Summary) -> Markup {
         share(summary.unknown.contradicted),
         share(summary.unknown.ambiguous)
     );
+    let depth = match summary.computed_depth {
+        Some(share) => format!(", depth computed from them on {:.0} % of the object's pixels", 100.0 * share),
+        None => " with depth".into(),
+    };
     let rows = [
         (
             "surface",
@@ -89,15 +93,7 @@ fn shape(summary: &Summary) -> Markup {
         ("splats", format!("{} in splats.ply", summary.splats)),
         ("mass", format!("{:.3} kg, {mass}", summary.mass_kg)),
         ("scale", format!("one unit of the poses is {:.5} m: {source}", scale.metres)),
-        (
-            "views",
-            format!(
-                "{} to learn from{}, {} held out",
-                summary.views,
-                if summary.with_depth { " with depth" } else { "" },
-                summary.held_out.len()
-            ),
-        ),
+        ("views", format!("{} to learn from{}, {} held out", summary.views, depth, summary.held_out.len())),
         (
             "cameras",
             format!("moved by {:.2} mm (root mean square) to agree with each other", summary.cameras_moved_m * 1e3),

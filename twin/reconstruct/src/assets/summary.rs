@@ -40,6 +40,8 @@ pub struct Summary {
     pub views: usize,
     /// Whether they had depth.
     pub with_depth: bool,
+    /// Of the object's pixels, the share of which depth was computed from the pictures [1]; `None` where it was measured.
+    pub computed_depth: Option<f64>,
     /// How far the cameras' poses were moved, root mean square [m].
     pub cameras_moved_m: f64,
     pub held_out: Vec<HeldOutNumbers>,
@@ -124,6 +126,7 @@ impl Summary {
             scale: object.scale,
             views: object.train.len(),
             with_depth: object.with_depth,
+            computed_depth: object.computed.map(|computed| computed.share),
             cameras_moved_m: object.moved,
             held_out: held_out.collect(),
             psnr_db: object.psnr(),

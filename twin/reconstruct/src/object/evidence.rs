@@ -26,6 +26,8 @@ const TRIED: usize = 5;
 /// So near to a mask's border, seen from a view that it faces no more than by this cosine, an outline shows a corner [voxel].
 const OUTLINED: f64 = 1.5;
 const GRAZED: f64 = 0.3;
+/// Depth that was computed is on the surface so near to it [voxel]: as near as depths are compared with it.
+const THERE: f64 = 2.0;
 
 /// Whether the views say where a corner of the surface is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -37,7 +39,7 @@ pub enum Certainty {
     Unseen,
     /// Their colours there are of several places.
     Contradicted,
-    /// Their colours are as alike, or more, up to two voxels behind it, and no outline shows it.
+    /// Their colours are as alike, or more, up to two voxels behind it, and no outline shows it, nor computed depth.
     Ambiguous,
 }
 
@@ -51,25 +53,39 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Of a mesh on the surface of `field`, from the poses that the frames have by now. Depth says where the surface is.
-    pub(super) fn of(field: &Field<f32>, mesh: &Mesh, frames: &[Frame], poses: &[Isometry3<f64>]) -> Self {
+    /// Of a mesh on the surface of `field`, from the poses that the frames have by now. Depth that was measured says where the surface is;
+    /// depth that was computed does so where views have it on the surface.
+    pub(super) fn of(
+        field: &Field<f32>,
+        mesh: &Mesh,
+        (frames, poses): (&[Frame], &[Isometry3<f64>]),
+        is_measured: bool,
+    ) -> Self {
         let normals = normals(mesh);
         let (mut views, mut colours) = (vec![0u8; mesh.points.len()], vec![Vec::new(); mesh.points.len()]);
+        let mut depths = vec![0u8; mesh.points.len()];
         for (frame, pose) in frames.iter().zip(poses) {
             for (corner, pixel) in seen((field, mesh, &normals), (frame, pose)).into_iter().enumerate() {
                 views[corner] = views[corner].saturating_add(u8::from(pixel.is_some()));
                 colours[corner].extend(pixel.and_then(|pixel| mean(frame, pixel, COARSER)));
+                let z = pose.inverse_transform_point(&mesh.points[corner]).z;
+                let depth = pixel.and_then(|pixel| depth(frame, pixel));
+                let is_there = depth.is_some_and(|depth| (depth - z).abs() < THERE * field.grid.voxel);
+                depths[corner] = depths[corner].saturating_add(u8::from(is_there));
             }
         }
         let seen = |corner: usize| if views[corner] < SEEN { Certainty::Unseen } else { Certainty::Known };
         let mut certainty: Vec<Certainty> = (0..views.len()).map(seen).collect();
-        if frames.iter().all(|frame| frame.depth.is_empty()) {
+        if !is_measured {
             let apart = Neighbours::of(mesh).smoothed(colours.iter().map(|colours| apart(colours)).collect());
             let middle = mesh.middle();
             let stereo = Stereo::new((frames, poses), (field.grid.voxel, &middle));
             let ambiguous = stereo.ambiguous(field, mesh, TRIED);
             let outlined = outlined((field, mesh, &normals), (frames, poses));
             for (corner, certainty) in certainty.iter_mut().enumerate().filter(|(_, c)| **c == Certainty::Known) {
+                if depths[corner] >= SEEN {
+                    continue;
+                }
                 if apart[corner].is_some_and(|apart| apart > CONTRADICTORY) {
                     *certainty = Certainty::Contradicted;
                 } else if ambiguous[corner] && !outlined[corner] {
@@ -84,6 +100,12 @@ impl Evidence {
     pub(super) fn share(&self, mesh: &Mesh, is: Certainty) -> f64 {
         share(mesh, |corner| self.certainty[corner] == is)
     }
+}
+
+/// Depth of the middle one of the pixels that are one in a picture reduced by [`COARSER`] [m]; `None` where there is none.
+fn depth(frame: &Frame, [column, row]: [usize; 2]) -> Option<f64> {
+    let [x, y] = [column, row].map(|at| at * COARSER as usize + COARSER as usize / 2);
+    frame.depth.get(y * frame.camera.width as usize + x).filter(|z| **z > 0.0).map(|z| f64::from(*z))
 }
 
 /// Whether each corner of a mesh on the surface of a field lies in the outline of some view's mask.
@@ -185,7 +207,7 @@ pub(super) mod tests {
         let shares = |hollow: bool| {
             let field = body(hollow);
             let (mesh, _) = surface(&field).expect("a body");
-            let Evidence { views, certainty } = Evidence::of(&field, &mesh, &frames, &poses);
+            let Evidence { views, certainty } = Evidence::of(&field, &mesh, (&frames, &poses), false);
             let share = |counts: &dyn Fn(&Point3<f64>) -> bool| {
                 let all: Vec<usize> = (0..views.len()).filter(|i| counts(&mesh.points[*i]) && views[*i] > 3).collect();
                 all.iter().filter(|i| certainty[**i] != Certainty::Known).count() as f64 / all.len() as f64

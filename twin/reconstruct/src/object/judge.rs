@@ -7,6 +7,7 @@ use super::pool;
 use super::table::Support;
 use super::view::{Drawn, draw};
 use super::walls::ThinWalls;
+use crate::computed::Computed;
 use crate::field::{Field, Grid};
 use crate::mesh::{Islands, Mesh};
 use crate::remark::Remark;
@@ -136,6 +137,8 @@ pub(super) struct Found<'a> {
     /// Views to learn from and those held out.
     pub(super) frames: [&'a [Frame]; 2],
     pub(super) held_out: &'a [HeldOut],
+    /// The depth that was computed where none was measured.
+    pub(super) computed: Option<&'a Computed>,
 }
 
 /// What a person should know about the surface.
@@ -149,9 +152,7 @@ pub(super) fn remarks(found: &Found<'_>) -> Vec<Remark> {
         )));
     }
     remarks.extend(underside(found));
-    if found.frames[0].iter().all(|frame| frame.depth.is_empty()) {
-        remarks.push(hollows(found));
-    }
+    remarks.extend(found.computed.map(|computed| hollows(found, computed)));
     remarks.extend(walls(found));
     remarks.extend(beside(found));
     let views = found.held_out;
@@ -190,14 +191,16 @@ fn underside(found: &Found<'_>) -> Option<Remark> {
     })
 }
 
-/// Silhouettes show no hollow that opens to one side, and colours only some.
-fn hollows(found: &Found<'_>) -> Remark {
+/// Silhouettes show no hollow that opens to one side, and colours only those that have a print.
+fn hollows(found: &Found<'_>, computed: &Computed) -> Remark {
     let share = |is| 100.0 * found.evidence.share(found.mesh, is);
     let (contradicted, ambiguous) = (share(Certainty::Contradicted), share(Certainty::Ambiguous));
     Remark(format!(
-        "made without depth: on {contradicted:.0} % of the surface the views contradict each other in colour, and on {ambiguous:.0} % colours \
-         agree as well {:.1} mm deeper and no outline shows it (both grey in object.ply): it may lie deeper there, a hollow be filled, a \
-         wall be too thick: take pictures with depth",
+        "made without depth pictures: depth was computed from the pictures, on {:.0} % of the object's pixels; elsewhere on {contradicted:.0} % of \
+         the surface the views contradict each other in colour, and on {ambiguous:.0} % it is a guess for want of texture: colours agree as \
+         well {:.1} mm deeper and no outline shows it (both grey in object.ply): it may lie deeper there, a hollow be filled, a wall be too \
+         thick: stick tape with a print there, or take pictures with depth",
+        100.0 * computed.share,
         DEEPER * found.field.grid.voxel * 1e3
     ))
 }

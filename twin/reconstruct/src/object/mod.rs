@@ -5,6 +5,7 @@
 //! | `pictures` | the views' pixels, and which of them say nothing |
 //! | `extent`, `bounds` | the box that holds the object, and how it is found |
 //! | `start` | visual hull, fused depth |
+//! | `ground` | the table, and depth where none was measured |
 //! | `hollow` | hollows that no silhouette shows, by colour |
 //! | `simple` | nodes that may change sides: no wall is pierced |
 //! | `stereo` | how far behind a surface the views agree best |
@@ -33,6 +34,7 @@ mod colours;
 mod corners;
 mod evidence;
 mod extent;
+mod ground;
 mod hollow;
 mod judge;
 mod learn;
@@ -56,11 +58,13 @@ pub use table::{Support, TableSource};
 pub use view::{Drawn, draw};
 
 use crate::closing;
+use crate::computed::Computed;
 use crate::field::{Field, Grid};
 use crate::mesh::{self, Flaw, Islands, Mesh, Solid, Topology};
 use crate::remark::Remark;
 use crate::scan::{Frame, Scale, ScaleSource, Scan, ScanError, Table};
 use evidence::Evidence;
+use ground::Ground;
 use judge::Found;
 use learn::{Learner, Plan, State};
 use nalgebra::{Isometry3, Point3};
@@ -148,6 +152,8 @@ pub struct Object {
     pub train: Vec<Frame>,
     /// Whether they had depth.
     pub with_depth: bool,
+    /// What was computed where they had none.
+    pub computed: Option<Computed>,
     /// Middle shift of the cameras, root mean square [m].
     pub moved: f64,
     /// What a person should know.
@@ -174,12 +180,12 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
     let scale = scan.scale(options.scale)?;
     let scan = scan.scaled(scale.metres);
     let mut pictures = pictures::read(&scan, |done| bar.show(done, READ))?;
-    bar.stage(START, 2);
-    let plan = Plan::new(options.edge, pictures.depth_spread.is_some());
     let mut bounds = bounds::find(&pictures.train)?;
     pictures.remarks.extend(bounds.remark(pictures.train.len()));
     let given = options.table.map(|table| table.scaled(scale.metres));
-    let support = table::find(&scan, given, &mut pictures, &mut bounds)?;
+    let Ground { support, computed } = Ground::find((&bar, &scan), given, &mut pictures, &mut bounds)?;
+    let plan = Plan::new(options.edge, pictures.depth_spread.is_some());
+    bar.stage(START, 2);
     let seen = Seen::all(&pictures.train, None);
     let grid = Grid::filling(&bounds.low, &bounds.high, plan.levels[0].nodes, 2);
     let distance = start::distance(&grid, &seen, &bounds, pictures.depth_spread);
@@ -202,14 +208,14 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         table::cut(&mut state.field, &support.table);
     }
     bar.stage(MESH, 3);
-    let gap = if pictures.depth_spread.is_some() { closing::PINHOLE } else { closing::TUNNEL };
+    let gap = if scan.has_depth() { closing::PINHOLE } else { closing::TUNNEL };
     let shape = Shape::of(&closing::closed(&state.field, gap), &bar)?;
     interrupted(&plan, &state)?;
     let trained = (pictures.train.as_slice(), poses.as_slice());
     let steps = appearance::steps(options.edge);
     let splats = appearance::trained(&bar, (&state.field, &shape.fine), trained, steps, keeper.splats())?;
     bar.stage(JUDGE, 1 + pictures.held_out.len() as u64);
-    let evidence = Evidence::of(&state.field, &shape.fine, &pictures.train, &poses);
+    let evidence = Evidence::of(&state.field, &shape.fine, (&pictures.train, &poses), scan.has_depth());
     let mut held_out = Vec::new();
     for frame in &pictures.held_out {
         bar.show(1 + held_out.len() as u64, JUDGE);
@@ -227,9 +233,9 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         support: support.as_ref(),
         frames: [&pictures.train, &pictures.held_out],
         held_out: &held_out,
+        computed: computed.as_ref(),
     }));
-    let shifts = state.corrections.iter().map(|c| c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
-    let moved = (shifts.sum::<f64>() / state.corrections.len() as f64).sqrt();
+    let moved = moved(&state.corrections);
     let Shape { fine, coarse, topology, solid, islands } = shape;
     Ok(Object {
         field: state.field,
@@ -246,9 +252,16 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object,
         held_out,
         train: moved_to(pictures.train, poses),
         with_depth: scan.has_depth(),
+        computed,
         moved,
         remarks,
     })
+}
+
+/// Middle shift of cameras, root mean square [m].
+fn moved(corrections: &[[f64; 6]]) -> f64 {
+    let shifts = corrections.iter().map(|c| c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+    (shifts.sum::<f64>() / corrections.len() as f64).sqrt()
 }
 
 /// Views from where their cameras stand by now.

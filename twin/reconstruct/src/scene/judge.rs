@@ -1,5 +1,6 @@
 //! How good it is, by pictures that took no part.
 
+use crate::computed::Computed;
 use crate::remark::Remark;
 use crate::scan::Frame;
 use crate::splats;
@@ -28,8 +29,8 @@ pub struct HeldOut {
     pub surface: Vec<[u8; 3]>,
     /// Peak signal-to-noise ratio of the splats over the whole picture [dB].
     pub psnr: f64,
-    /// Middle absolute difference of the surface's depth and the measured one, whose noise is in it [m].
-    pub depth_off: f64,
+    /// Middle absolute difference of the surface's depth and the measured one, whose noise is in it [m]; `None` where none was measured.
+    pub depth_off: Option<f64>,
     /// Share of the measured pixels at which there is a surface.
     pub covered: f64,
 }
@@ -61,15 +62,21 @@ pub(super) fn held_out(
         splats: picture,
         splat_depth: if planar { splats::plane_depth(cloud, &frame.camera, pose) } else { drawn.depth },
         surface: surface.rgb8().collect(),
-        depth_off: median(offs).unwrap_or(0.0),
+        depth_off: median(offs),
         covered: compared as f64 / measured().count().max(1) as f64,
     }
 }
 
 /// What a person should know.
-pub(super) fn remarks(levels: &[Level]) -> Vec<Remark> {
-    if levels.is_empty() {
-        return vec![Remark("there is no level surface: is the table in the pictures, and which way is up?".into())];
-    }
-    Vec::new()
+pub(super) fn remarks(levels: &[Level], computed: Option<&Computed>) -> Vec<Remark> {
+    let level = "there is no level surface: is the table in the pictures, and which way is up?";
+    let none = levels.is_empty().then(|| Remark(level.into()));
+    let depth = computed.map(|computed| {
+        Remark(format!(
+            "made without depth pictures: depth was computed from the pictures, on {:.0} % of their pixels; what has no texture is missing: stick \
+             tape with a print there, or take pictures with depth",
+            100.0 * computed.share
+        ))
+    });
+    none.into_iter().chain(depth).collect()
 }

@@ -1,4 +1,4 @@
-//! A scene out of a scan with depth: what stands around, as one surface, its levels, splats, and a mesh
+//! A scene out of a scan, with depth that was measured or is computed: what stands around, as one surface, its levels, splats, and a mesh
 //! of fewer triangles to collide with.
 //!
 //! | file | owns |
@@ -13,6 +13,7 @@ mod views;
 
 pub use judge::HeldOut;
 
+use crate::computed::{self, Computed, Wanted};
 use crate::mesh::{self, Mesh};
 use crate::remark::Remark;
 use crate::scan::{Frame, Scale, ScaleSource, Scan, ScanError};
@@ -39,6 +40,13 @@ const FARTHEST: f32 = 4.0;
 const MIN_VIEWS: u16 = 3;
 /// Parts of a surface with fewer triangles are noise.
 const ISLAND: usize = 200;
+
+/// What pictures without depth show lies no nearer [m].
+const NEAREST: f64 = 0.15;
+const DEPTH: &str = "depth";
+/// How often the share of it that is done may change, and how long a view takes beside the stages of the plan [s].
+const DEPTH_STEPS: u64 = 1000;
+const DEPTH_SECONDS: f64 = 3.0;
 
 /// Stages of the work with how long each takes of 60 views on two cores [s].
 const STAGES: [Planned; 5] = [(READ, 5.0), (FUSE, 15.0), (MESH, 12.0), (SPLATS, 300.0), (JUDGE, 8.0)];
@@ -117,6 +125,8 @@ pub struct Scene {
     pub held_out: Vec<HeldOut>,
     /// Views that it was made from.
     pub train: Vec<Frame>,
+    /// The depth that was computed where none was measured.
+    pub computed: Option<Computed>,
     /// What a person should know.
     pub remarks: Vec<Remark>,
 }
@@ -130,7 +140,8 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Scene, 
     let of_robot = scan.is_of_robot();
     let scale = scan.scale(options.scale)?;
     let scan = scan.scaled(scale.metres);
-    let views = views::read(&scan, |done| bar.show(done, READ))?;
+    let mut views = views::read(&scan, |done| bar.show(done, READ))?;
+    let computed = if scan.has_depth() { None } else { Some(computed(&bar, &mut views.train)?) };
     views::agree(&views.train, scale.source == ScaleSource::Poses)?;
     let surface = fused(&bar, &views, options)?;
     upright::from_around(&surface, &views.train)?;
@@ -151,7 +162,7 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Scene, 
         held_out.push(judge::held_out((&splats, options.planar), &looks, frame, background));
     }
     let mut remarks = views.remarks;
-    remarks.extend(judge::remarks(&levels));
+    remarks.extend(judge::remarks(&levels, computed.as_ref()));
     Ok(Scene {
         surface,
         collision,
@@ -164,8 +175,18 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Scene, 
         planar: options.planar,
         held_out,
         train: views.train,
+        computed,
         remarks,
     })
+}
+
+/// Computes depth of the views that learn, of which none was measured.
+fn computed(bar: &Progress, frames: &mut [Frame]) -> Result<Computed, SceneError> {
+    bar.insert(&[(DEPTH, DEPTH_SECONDS * frames.len() as f64)]);
+    bar.stage(DEPTH, DEPTH_STEPS);
+    let range = [NEAREST, f64::from(FARTHEST)];
+    let done = |share: f64| bar.show((share * DEPTH_STEPS as f64) as u64, DEPTH);
+    computed::fill(frames, |_| Wanted { range, fine: Vec::new() }, &done).ok_or(SceneError::Interrupted(0.0))
 }
 
 /// Before the splats there is little to keep.
@@ -248,8 +269,9 @@ impl Scene {
         self.held_out.iter().map(|view| view.psnr).sum::<f64>() / self.held_out.len().max(1) as f64
     }
 
-    /// Mean of the held-out views' middle difference between the surface's depth and the measured one [m].
-    pub fn depth_off(&self) -> f64 {
-        self.held_out.iter().map(|view| view.depth_off).sum::<f64>() / self.held_out.len().max(1) as f64
+    /// Mean of the held-out views' middle difference between the surface's depth and the measured one [m]; `None` where none was measured.
+    pub fn depth_off(&self) -> Option<f64> {
+        let all: Vec<f64> = self.held_out.iter().filter_map(|view| view.depth_off).collect();
+        (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
     }
 }

@@ -33,18 +33,11 @@ pub(super) struct Views {
 
 /// Reads all views. `done` is called with the number of views that are read.
 pub(super) fn read(scan: &Scan, done: impl Fn(u64) + Sync) -> Result<Views, SceneError> {
-    if !scan.has_depth() {
-        return Err(ScanError::Missing(format!(
-            "{}: no depth pictures; a scene is fused from depth: give depth/NAME.png (16 bits, millimetres) beside the pictures",
-            scan.folder.display()
-        ))
-        .into());
-    }
     let frames = read_all(scan, LONGEST, |view, by| scan.whole_frame(view, by), done)?;
     let count = frames.len();
     let mut remarks = scan.remarks.clone();
-    let (frames, empty): (Vec<Frame>, Vec<Frame>) =
-        frames.into_iter().partition(|frame| frame.depth.iter().any(|z| *z > 0.0));
+    let has_depth = |frame: &Frame| !scan.has_depth() || frame.depth.iter().any(|z| *z > 0.0);
+    let (frames, empty): (Vec<Frame>, Vec<Frame>) = frames.into_iter().partition(has_depth);
     if !empty.is_empty() {
         remarks.push(Remark(format!("{} views have no depth and were left out", empty.len())));
     }

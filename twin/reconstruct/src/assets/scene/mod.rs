@@ -42,8 +42,11 @@ pub struct SceneSummary {
     pub held_out: Vec<ViewNumbers>,
     /// Their mean PSNR by splats, over whole pictures [dB].
     pub psnr_db: f64,
-    /// Mean of their middle differences between the surface's depth and the measured one, with its noise [m].
-    pub depth_off_m: f64,
+    /// Mean of their middle differences between the surface's depth and the measured one, with its noise [m]; `None` where none was
+    /// measured.
+    pub depth_off_m: Option<f64>,
+    /// Of the pixels of the views that it was made from, the share of which depth was computed [1]; `None` where it was measured.
+    pub computed_depth: Option<f64>,
     /// What a person should know.
     pub remarks: Vec<Remark>,
 }
@@ -69,8 +72,8 @@ pub struct ViewNumbers {
     pub view: String,
     /// PSNR of the splats over the whole picture [dB].
     pub psnr_db: f64,
-    /// Middle difference between the surface's depth and the measured one [m].
-    pub depth_off_m: f64,
+    /// Middle difference between the surface's depth and the measured one [m]; `None` where none was measured.
+    pub depth_off_m: Option<f64>,
     /// Share of the measured pixels at which there is a surface.
     pub covered: f64,
 }
@@ -105,6 +108,7 @@ impl SceneSummary {
             held_out: scene.held_out.iter().map(view).collect(),
             psnr_db: scene.psnr(),
             depth_off_m: scene.depth_off(),
+            computed_depth: scene.computed.map(|computed| computed.share),
             remarks: scene.remarks.clone(),
         }
     }
@@ -175,7 +179,8 @@ mod tests {
             views: 52,
             held_out: Vec::new(),
             psnr_db: 30.0,
-            depth_off_m: 2e-3,
+            depth_off_m: Some(2e-3),
+            computed_depth: None,
             remarks: Vec::new(),
         }
     }

@@ -22,11 +22,16 @@ pub(super) fn page(scene: &Scene, summary: &SceneSummary, command: &str) -> Stri
     framed("Scene", &content, command)
 }
 
+/// A difference of depth in words.
+fn off(metres: Option<f64>) -> String {
+    metres.map_or("not measured".into(), |metres| format!("{:.1} mm", 1e3 * metres))
+}
+
 fn facts(summary: &SceneSummary) -> Markup {
     let height = summary.table.map_or("none".to_owned(), |table| format!("{:.1} mm", 1e3 * table.offset_m));
     let entries = [
         (format!("{:.1} dB", summary.psnr_db), "PSNR of held-out views by splats"),
-        (format!("{:.1} mm", 1e3 * summary.depth_off_m), "depth of held-out views off the surface"),
+        (off(summary.depth_off_m), "depth of held-out views off the surface"),
         (height, "the table's distance from the origin"),
         (format!("{:.1} mm", 1e3 * summary.voxel_m), "edge of a voxel"),
     ];
@@ -48,6 +53,9 @@ fn shape(summary: &SceneSummary) -> Markup {
         )
     };
     let frame = if summary.in_base_frame { "the robot's base frame" } else { "the scan's frame, in metres" };
+    let depth = summary
+        .computed_depth
+        .map_or(String::new(), |share| format!(", depth computed from them on {:.0} % of their pixels", 100.0 * share));
     let planar = if summary.planar { ", drawn into planes" } else { "" };
     let rows = [
         ("frame", frame.to_owned()),
@@ -55,7 +63,7 @@ fn shape(summary: &SceneSummary) -> Markup {
         ("to collide with", format!("{} triangles in scene.obj", summary.collision_triangles)),
         ("splats", format!("{} in splats.ply{planar}", summary.splats)),
         ("scale", format!("one unit of the poses is {:.5} m", summary.scale.metres)),
-        ("views", format!("{} to learn from, {} held out", summary.views, summary.held_out.len())),
+        ("views", format!("{} to learn from{depth}, {} held out", summary.views, summary.held_out.len())),
     ];
     html! {
         table {
@@ -81,9 +89,9 @@ fn held_out(view: &HeldOut, numbers: &ViewNumbers) -> Markup {
             }
             figcaption {
                 (view.name) ": " (format!(
-                    "{:.1} dB; depth {:.1} mm off; a surface at {:.1} % of the measured pixels",
+                    "{:.1} dB; depth off by {}; a surface at {:.1} % of the measured pixels",
                     numbers.psnr_db,
-                    1e3 * numbers.depth_off_m,
+                    off(numbers.depth_off_m),
                     1e2 * numbers.covered
                 ))
             }
