@@ -20,9 +20,8 @@ const RIM: i16 = 4;
 /// window. That of the cameras in `tests/peers/scan.py`.
 const SPREAD: f64 = 5e-3;
 const DEPTH: &str = "depth";
-/// How often the share of it that is done may change, and how long a view takes beside the stages of the plan [s].
+/// How often the share of it that is done may change.
 const DEPTH_STEPS: u64 = 1000;
-const DEPTH_SECONDS: f64 = 1.5;
 
 /// The table, and the depth that was computed.
 pub(super) struct Ground {
@@ -52,7 +51,6 @@ impl Ground {
 
 /// Computes depth of the views that learn, of which none was measured; where they say hardly any, they stay without.
 fn compute(bar: &Progress, pictures: &mut Pictures, bounds: &Bounds) -> Result<Computed, ObjectError> {
-    bar.insert(&[(DEPTH, DEPTH_SECONDS * pictures.train.len() as f64)]);
     bar.stage(DEPTH, DEPTH_STEPS);
     let (centre, radius) = (bounds.centre(), bounds.radius());
     let wanted = |frame: &Frame| {

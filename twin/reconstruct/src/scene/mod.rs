@@ -44,9 +44,8 @@ const ISLAND: usize = 200;
 /// What pictures without depth show lies no nearer [m].
 const NEAREST: f64 = 0.15;
 const DEPTH: &str = "depth";
-/// How often the share of it that is done may change, and how long a view takes beside the stages of the plan [s].
+/// How often the share of it that is done may change.
 const DEPTH_STEPS: u64 = 1000;
-const DEPTH_SECONDS: f64 = 3.0;
 
 /// Stages of the work with how long each takes of 60 views on two cores [s].
 const STAGES: [Planned; 5] = [(READ, 5.0), (FUSE, 15.0), (MESH, 12.0), (SPLATS, 300.0), (JUDGE, 8.0)];
@@ -182,7 +181,6 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Scene, 
 
 /// Computes depth of the views that learn, of which none was measured.
 fn computed(bar: &Progress, frames: &mut [Frame]) -> Result<Computed, SceneError> {
-    bar.insert(&[(DEPTH, DEPTH_SECONDS * frames.len() as f64)]);
     bar.stage(DEPTH, DEPTH_STEPS);
     let range = [NEAREST, f64::from(FARTHEST)];
     let done = |share: f64| bar.show((share * DEPTH_STEPS as f64) as u64, DEPTH);
