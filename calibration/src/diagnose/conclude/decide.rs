@@ -74,6 +74,7 @@ fn finding<'a>(case: &Case<'a>, measures: &Measures) -> Finding<'a> {
         rivals,
         confidence: sureness(found),
         clear,
+        beyond_chance: found.is_beyond_chance(),
         of_arm: found.last.effects.iter().all(|effect| bench.library.candidates[*effect].is_of_arm()),
         left: measures.left.sensors.clone(),
         confirmed: measures.confirmation.holds || measures.confirmation.better && found.shows_beside_contact(),

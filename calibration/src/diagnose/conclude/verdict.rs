@@ -18,6 +18,8 @@ pub(super) struct Finding<'a> {
     pub(super) confidence: f64,
     /// Whether each of them stood out: nearly all clips spoke for it, and for no other.
     pub(super) clear: bool,
+    /// Whether what each of them gains is no chance by far.
+    pub(super) beyond_chance: bool,
     /// Whether all of them act on the arm.
     pub(super) of_arm: bool,
     /// The gap before and after, of every group of sensors.
@@ -101,8 +103,10 @@ impl Finding<'_> {
         }
         // Rivals share what is sure: that one of them acts may be surer than each of them.
         let unlikely = self.rivals.is_empty() && self.confidence < LEAST_CONFIDENCE;
-        if self.effects.is_empty() || !self.confirmed || unlikely {
-            let gap = self.left.iter().any(|left| left.gaps() > 1.0);
+        let gap = self.left.iter().any(|left| left.gaps() > 1.0);
+        // Strokes of two engines differ so much anyway: in no larger a gap, of forty candidates some gain by chance.
+        let may_be_chance = !gap && !self.of_arm && !self.beyond_chance;
+        if self.effects.is_empty() || !self.confirmed || unlikely || may_be_chance {
             return if gap || self.drift.is_some() { self.unexplained() } else { self.none() };
         }
         // A substitute is pushed beyond its range to close a gap that is not its own, and does not close it whole.
@@ -200,6 +204,7 @@ pub(in crate::diagnose) mod tests {
             rivals: Vec::new(),
             confidence: 0.95,
             clear: false,
+            beyond_chance: true,
             of_arm: true,
             left,
             confirmed: true,
@@ -269,6 +274,18 @@ pub(in crate::diagnose) mod tests {
         let refuted = Finding { confirmed: false, ..finding(vec!["payload"], 500.0, 1.5) };
         assert_eq!(refuted.decide().kind, Kind::Unexplained);
         assert_eq!(Finding { confirmed: false, ..finding(vec!["payload"], 1.5, 1.2) }.decide().kind, Kind::None);
+    }
+
+    #[test]
+    fn in_a_gap_that_two_engines_leave_anyway_a_cause_of_strokes_is_beyond_chance() {
+        let little = Finding { of_arm: false, ..finding(vec!["tool_offset"], 1.5, 1.2) };
+        assert_eq!(little.decide().kind, Kind::Named);
+        let by_chance = Finding { beyond_chance: false, ..little };
+        assert_eq!(by_chance.decide().kind, Kind::None);
+        assert_eq!(Finding { rivals: vec!["camera_scale"], ..by_chance.clone() }.decide().kind, Kind::None);
+        assert_eq!(Finding { of_arm: true, ..by_chance }.decide().kind, Kind::Named);
+        let plain = Finding { of_arm: false, beyond_chance: false, ..finding(vec!["tool_offset"], 500.0, 1.5) };
+        assert_eq!(plain.decide().kind, Kind::Named);
     }
 
     #[test]

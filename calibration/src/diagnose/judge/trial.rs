@@ -150,6 +150,12 @@ impl Found {
             |(place, effect): (usize, usize)| self.steps[place].trial(effect).is_some_and(Trial::shows_beside_contact);
         !self.last.effects.is_empty() && self.kept().all(shows)
     }
+
+    /// Whether the gain of each of the effects that were kept is no chance by far.
+    pub fn is_beyond_chance(&self) -> bool {
+        let gain = |(place, effect): (usize, usize)| self.steps[place].trial(effect).and_then(Trial::gain);
+        self.kept().all(|kept| gain(kept).is_some_and(|gain| gain.nats > NO_CHANCE_SIGMAS * gain.error))
+    }
 }
 
 impl Step {
