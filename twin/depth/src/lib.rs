@@ -26,8 +26,6 @@ mod plane;
 mod random;
 mod similarity;
 mod sweep;
-#[cfg(test)]
-mod tests;
 
 pub use camera::{Camera, Depth, View};
 pub use levels::estimate;

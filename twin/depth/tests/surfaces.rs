@@ -1,6 +1,6 @@
 //! Depth of surfaces that are drawn from their equations.
 
-use crate::{Camera, Depth, View, estimate};
+use depth::{Camera, Depth, View, estimate};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 const SIZE: [usize; 2] = [160, 120];
@@ -46,7 +46,8 @@ fn scan(surface: Surface, texture: bool) -> (Vec<View>, Vec<f64>) {
         let camera = Camera { size: SIZE, focal: [FOCAL; 2], centre: CENTRE };
         let mut grey = Vec::new();
         for at in 0..SIZE[0] * SIZE[1] {
-            let [x, y] = camera.direction([(at % SIZE[0]) as f64 + 0.5, (at / SIZE[0]) as f64 + 0.5]);
+            let pixel = [(at % SIZE[0]) as f64 + 0.5, (at / SIZE[0]) as f64 + 0.5];
+            let [x, y] = [0, 1].map(|i| (pixel[i] - CENTRE[i]) / FOCAL);
             let along = pose * Vector3::new(x, y, 1.0);
             let hit = surface(&eye, &along);
             if number == 0 {
@@ -85,6 +86,7 @@ fn a_printed_plane_that_slants_is_found() {
     let (views, truth) = scan(slanted, true);
     let depth = first(&views);
     let (middle, share) = judged(&depth, &truth);
+    eprintln!("plane: {:.3} mm off on {:.1} %", 1e3 * middle, 1e2 * share);
     assert!(middle < 5e-4 && share > 0.9, "{middle} m off on {share}");
     let towards = Vector3::new(-0.5, 0.27, -0.82).normalize();
     let towards = views[0].camera_from_world * towards;
@@ -98,6 +100,7 @@ fn a_printed_plane_that_slants_is_found() {
 fn a_printed_ball_is_found() {
     let (views, truth) = scan(ball, true);
     let (middle, share) = judged(&first(&views), &truth);
+    eprintln!("ball: {:.3} mm off on {:.1} %", 1e3 * middle, 1e2 * share);
     assert!(middle < 8e-4 && share > 0.8, "{middle} m off on {share}");
 }
 
