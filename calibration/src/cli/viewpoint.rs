@@ -66,7 +66,7 @@ pub struct ViewpointArguments {
     #[arg(long, value_enum, default_value_t = MethodName::Outline)]
     method: MethodName,
     /// Points that the swarm tries, for each of which every frame is drawn.
-    #[arg(long = "points", alias = "budget", value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(40..=1_000_000))]
+    #[arg(long, alias = "budget", value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(40..=1_000_000))]
     points: u32,
     /// At most so many pictures of a session.
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=100))]

@@ -5,9 +5,13 @@ use depth::View;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use shared_mem::lens::Distortion;
+use shared_mem::progress::Progress;
 
 /// Numbers of the random planes that the search tries.
 const SEED: u64 = 1;
+/// The stage of the work, and how often the share of it that is done may change.
+const DEPTH: &str = "depth";
+const DEPTH_STEPS: u64 = 1000;
 
 /// How much depth was computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,15 +28,13 @@ pub(crate) struct Wanted {
     pub(crate) fine: Vec<bool>,
 }
 
-/// Gives frames the depth that their pictures say, 0 where they say none; `done` is told which share of the work is done. `None` once the
-/// end was asked for, and the frames are as they were.
-pub(crate) fn fill(
-    frames: &mut [Frame],
-    wanted: impl Fn(&Frame) -> Wanted + Sync,
-    done: &dyn Fn(f64),
-) -> Option<Computed> {
+/// Gives frames the depth that their pictures say, 0 where they say none, in a stage of its own. `None` once the end was asked for, and the
+/// frames are as they were.
+pub(crate) fn fill(bar: &Progress, frames: &mut [Frame], wanted: impl Fn(&Frame) -> Wanted + Sync) -> Option<Computed> {
+    bar.stage(DEPTH, DEPTH_STEPS);
+    let done = |share: f64| bar.show((share * DEPTH_STEPS as f64) as u64, DEPTH);
     let views: Vec<View> = frames.par_iter().map(|frame| view(frame, wanted(frame))).collect();
-    let depths = depth::estimate(&views, SEED, done)?;
+    let depths = depth::estimate(&views, SEED, &done)?;
     let (mut known, mut all) = (0usize, 0usize);
     for ((frame, view), depth) in frames.iter_mut().zip(&views).zip(depths) {
         frame.depth = bent(&frame.camera, &depth.depth);

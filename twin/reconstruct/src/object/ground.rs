@@ -19,9 +19,6 @@ const RIM: i16 = 4;
 /// Standard deviation at one metre of depth that is computed, at least [m]: what neighbours differ by says less, since they are of one
 /// window. That of the cameras in `tests/peers/scan.py`.
 const SPREAD: f64 = 5e-3;
-const DEPTH: &str = "depth";
-/// How often the share of it that is done may change.
-const DEPTH_STEPS: u64 = 1000;
 
 /// The table, and the depth that was computed.
 pub(super) struct Ground {
@@ -51,7 +48,6 @@ impl Ground {
 
 /// Computes depth of the views that learn, of which none was measured; where they say hardly any, they stay without.
 fn compute(bar: &Progress, pictures: &mut Pictures, bounds: &Bounds) -> Result<Computed, ObjectError> {
-    bar.stage(DEPTH, DEPTH_STEPS);
     let (centre, radius) = (bounds.centre(), bounds.radius());
     let wanted = |frame: &Frame| {
         let away = frame.scan_from_camera.inverse_transform_point(&centre).coords.norm();
@@ -59,9 +55,8 @@ fn compute(bar: &Progress, pictures: &mut Pictures, bounds: &Bounds) -> Result<C
         let fine = frame.border_distance(RIM + 1).into_iter().map(|steps| steps >= -RIM).collect();
         Wanted { range, fine }
     };
-    let done = |share: f64| bar.show((share * DEPTH_STEPS as f64) as u64, DEPTH);
     let computed =
-        computed::fill(&mut pictures.train, wanted, &done).ok_or(ObjectError::Interrupted(0.0, "optimisation"))?;
+        computed::fill(bar, &mut pictures.train, wanted).ok_or(ObjectError::Interrupted(0.0, "optimisation"))?;
     pictures.depth_spread = views::spread(&pictures.train).map(|spread| spread.max(SPREAD));
     if pictures.depth_spread.is_none() {
         pictures.train.iter_mut().for_each(|frame| frame.depth.clear());

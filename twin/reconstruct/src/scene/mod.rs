@@ -43,9 +43,6 @@ const ISLAND: usize = 200;
 
 /// What pictures without depth show lies no nearer [m].
 const NEAREST: f64 = 0.15;
-const DEPTH: &str = "depth";
-/// How often the share of it that is done may change.
-const DEPTH_STEPS: u64 = 1000;
 
 /// Stages of the work with how long each takes of 60 views on two cores [s].
 const STAGES: [Planned; 5] = [(READ, 5.0), (FUSE, 15.0), (MESH, 12.0), (SPLATS, 300.0), (JUDGE, 8.0)];
@@ -181,10 +178,8 @@ pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Scene, 
 
 /// Computes depth of the views that learn, of which none was measured.
 fn computed(bar: &Progress, frames: &mut [Frame]) -> Result<Computed, SceneError> {
-    bar.stage(DEPTH, DEPTH_STEPS);
     let range = [NEAREST, f64::from(FARTHEST)];
-    let done = |share: f64| bar.show((share * DEPTH_STEPS as f64) as u64, DEPTH);
-    computed::fill(frames, |_| Wanted { range, fine: Vec::new() }, &done).ok_or(SceneError::Interrupted(0.0))
+    computed::fill(bar, frames, |_| Wanted { range, fine: Vec::new() }).ok_or(SceneError::Interrupted(0.0))
 }
 
 /// Before the splats there is little to keep.
