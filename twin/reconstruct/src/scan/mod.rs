@@ -113,7 +113,7 @@ fn poses_of(scan: &Path) -> Result<Poses, ScanError> {
         return Ok(Poses::Colmap(folder));
     }
     Err(ScanError::Missing(format!(
-        "{}: no poses; a scan holds transforms.json (nerfstudio) or transforms_train.json, poses.json (a robot's) or a COLMAP model in sparse/0",
+        "{}: no poses; a scan holds transforms.json (nerfstudio) or transforms_train.json, poses.json (a robot's) or a COLMAP model in sparse/0, as adapters/photographs/poses.py makes it of pictures alone",
         scan.display()
     )))
 }
