@@ -1,16 +1,16 @@
 //! Depth of a scan that was taken without: computed from its pictures and poses, and said to be so.
 
-use crate::scan::{Camera, Frame};
+use crate::scan::{Camera, Frame, Scan};
 use depth::View;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use shared_mem::lens::Distortion;
-use shared_mem::progress::Progress;
+use shared_mem::progress::{Planned, Progress};
 
 /// Numbers of the random planes that the search tries.
 const SEED: u64 = 1;
 /// The stage of the work, and how often the share of it that is done may change.
-const DEPTH: &str = "depth";
+pub(crate) const DEPTH: &str = "depth";
 const DEPTH_STEPS: u64 = 1000;
 
 /// How much depth was computed.
@@ -26,6 +26,11 @@ pub(crate) struct Wanted {
     pub(crate) range: [f64; 2],
     /// Pixels of which depth is wanted finely, row by row; empty: all.
     pub(crate) fine: Vec<bool>,
+}
+
+/// The stages of work on a scan, of all that there may be: depth is computed where none was measured alone.
+pub(crate) fn stages(all: &[Planned], scan: &Scan) -> Vec<Planned> {
+    all.iter().filter(|(name, _)| *name != DEPTH || !scan.has_depth()).copied().collect()
 }
 
 /// Gives frames the depth that their pictures say, 0 where they say none, in a stage of its own. `None` once the end was asked for, and the

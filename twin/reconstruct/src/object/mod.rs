@@ -58,7 +58,7 @@ pub use table::{Support, TableSource};
 pub use view::{Drawn, draw};
 
 use crate::closing;
-use crate::computed::Computed;
+use crate::computed::{Computed, DEPTH, stages};
 use crate::field::{Field, Grid};
 use crate::mesh::{self, Flaw, Islands, Mesh, Solid, Topology};
 use crate::remark::Remark;
@@ -82,7 +82,8 @@ pub const FINE: usize = 20_000;
 pub const COARSE: usize = 700;
 
 /// Stages of the work with how long each takes of 60 views on two cores [s].
-const STAGES: [Planned; 6] = [(READ, 6.0), (START, 12.0), (LEARN, 110.0), (MESH, 8.0), (SPLATS, 120.0), (JUDGE, 15.0)];
+const STAGES: [Planned; 7] =
+    [(READ, 6.0), (DEPTH, 100.0), (START, 12.0), (LEARN, 110.0), (MESH, 8.0), (SPLATS, 120.0), (JUDGE, 15.0)];
 const READ: &str = "read";
 const START: &str = "start";
 const LEARN: &str = "optimise";
@@ -176,7 +177,7 @@ pub struct Options {
 /// # Errors
 /// [`ObjectError`] in one line.
 pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Object, ObjectError> {
-    let bar = Progress::planned("reconstruct", &STAGES, scan.views.len() as u64);
+    let bar = Progress::planned("reconstruct", &stages(&STAGES, &scan), scan.views.len() as u64);
     let scale = scan.scale(options.scale)?;
     let scan = scan.scaled(scale.metres);
     let mut pictures = pictures::read(&scan, |done| bar.show(done, READ))?;

@@ -13,7 +13,7 @@ mod views;
 
 pub use judge::HeldOut;
 
-use crate::computed::{self, Computed, Wanted};
+use crate::computed::{self, Computed, DEPTH, Wanted};
 use crate::mesh::{self, Mesh};
 use crate::remark::Remark;
 use crate::scan::{Frame, Scale, ScaleSource, Scan, ScanError};
@@ -45,7 +45,7 @@ const ISLAND: usize = 200;
 const NEAREST: f64 = 0.15;
 
 /// Stages of the work with how long each takes of 60 views on two cores [s].
-const STAGES: [Planned; 5] = [(READ, 5.0), (FUSE, 15.0), (MESH, 12.0), (SPLATS, 300.0), (JUDGE, 8.0)];
+const STAGES: [Planned; 6] = [(READ, 5.0), (DEPTH, 110.0), (FUSE, 15.0), (MESH, 12.0), (SPLATS, 300.0), (JUDGE, 8.0)];
 const READ: &str = "read";
 const FUSE: &str = "fuse";
 const MESH: &str = "mesh";
@@ -132,7 +132,7 @@ pub struct Scene {
 /// # Errors
 /// [`SceneError`] in one line.
 pub fn reconstruct(scan: Scan, options: &Options, kept: &Path) -> Result<Scene, SceneError> {
-    let bar = Progress::planned("reconstruct", &STAGES, scan.views.len() as u64);
+    let bar = Progress::planned("reconstruct", &computed::stages(&STAGES, &scan), scan.views.len() as u64);
     let of_robot = scan.is_of_robot();
     let scale = scan.scale(options.scale)?;
     let scan = scan.scaled(scale.metres);
