@@ -24,6 +24,8 @@ const NUMERICS_OF_GAIN: f64 = 1e-3;
 /// Where nuisance parameters of clips hide what a candidate closes from the likelihood, one that has more parameters than another must
 /// close this much more of the gap.
 const CLOSED_BY_MORE_PARAMETERS: f64 = 0.04;
+/// The same where it leaves less than half of what the other leaves: near the whole gap, shares say little.
+const CLOSED_OF_LITTLE_LEFT: f64 = 0.01;
 
 /// A candidate tried on top of a hypothesis.
 #[derive(Debug, Clone)]
@@ -91,7 +93,9 @@ impl Trial {
     /// Whether it closes so much more of the gap that its additional numbers are worth it although clips are predicted as well
     /// without them.
     pub fn closes_more_than(&self, other: &Self) -> bool {
-        self.own_numbers && self.closed.most > other.closed.most + CLOSED_BY_MORE_PARAMETERS
+        let more = self.closed.most - other.closed.most;
+        let halves = 1.0 - self.closed.most < MOST_OF_IT * (1.0 - other.closed.most);
+        self.own_numbers && (more > CLOSED_BY_MORE_PARAMETERS || halves && more > CLOSED_OF_LITTLE_LEFT)
     }
 }
 
@@ -284,7 +288,7 @@ impl Step {
 mod tests {
     use super::super::test_trial::{step, trial};
     use super::*;
-    use crate::diagnose::test_bench::{ONCE, on_bench, shipped, truth, with_effect};
+    use crate::diagnose::test_bench::{ONCE, nothing_said_of, on_bench, shipped, truth, with_effect};
     use inference::likelihood::setting;
     use shared_mem::msg::MAX_JOINTS;
     use worlds::world::Kind;
@@ -308,6 +312,19 @@ mod tests {
         assert!(!cause(&in_all, BesideContact::default()), "engines differ so in contact");
         let in_a_stage = BesideContact { of_camera: false, in_a_stage: true };
         assert!(cause(&in_most, in_a_stage) && !cause(&|_| -1.0, in_a_stage));
+    }
+
+    #[test]
+    fn more_numbers_are_worth_it_that_leave_less_than_half() {
+        let cell = shipped();
+        let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), None, &[87.0; MAX_JOINTS]);
+        let closing = |share| Trial {
+            own_numbers: true,
+            closed: Closed::all(share),
+            ..Trial::untried(nothing_said_of(&library, 0), true)
+        };
+        let more = |[one, other]: [f64; 2]| closing(one).closes_more_than(&closing(other));
+        assert_eq!([[0.40, 0.35], [0.98, 0.95], [0.97, 0.95], [0.999, 0.995]].map(more), [true, true, false, false]);
     }
 
     #[test]

@@ -97,8 +97,9 @@ pub(in crate::diagnose) fn seen_at_the_least_scatter<'a>(
 /// what acts only from some size on, as play does, has no slope at its neutral point. Those on the object all have one, or are
 /// fitted in any case.
 pub(in crate::diagnose) fn overlooked(bench: &Bench<'_>, step: &Step) -> Vec<usize> {
-    let arm = step.left.iter().find(|group| !group.of_object);
-    if !arm.is_some_and(|arm| SensorGap::of_groups(&[*arm], &[*arm])[0].too_much(false)) {
+    // What a single cause leaves of the whole gap is no reason to try all the others.
+    let left = SensorGap::of_groups(&step.whole, &step.left);
+    if !left.iter().any(|left| !left.of_object() && left.too_much(false)) {
         return Vec::new();
     }
     let rest = step.trials.iter().filter(|trial| trial.fitted.is_none() && trial.scored.signal > TESTABLE);
