@@ -318,11 +318,8 @@ mod tests {
     fn more_numbers_are_worth_it_that_leave_less_than_half() {
         let cell = shipped();
         let library = Library::new(&cell, &setting::complete(&cell, None).expect("a cell"), None, &[87.0; MAX_JOINTS]);
-        let closing = |share| Trial {
-            own_numbers: true,
-            closed: Closed::all(share),
-            ..Trial::untried(nothing_said_of(&library, 0), true)
-        };
+        let untried = Trial::untried(nothing_said_of(&library, 0), true);
+        let closing = |share| Trial { closed: Closed::all(share), ..untried.clone() };
         let more = |[one, other]: [f64; 2]| closing(one).closes_more_than(&closing(other));
         assert_eq!([[0.40, 0.35], [0.98, 0.95], [0.97, 0.95], [0.999, 0.995]].map(more), [true, true, false, false]);
     }

@@ -73,7 +73,12 @@ pub(in crate::diagnose) fn to_fit(
 
 /// Whether the arm's gap is larger than numerics beside an object.
 pub(in crate::diagnose) fn arm_gap_is_open(whole: &[Typical], left: &[Typical]) -> bool {
-    left.len() > 1 && SensorGap::of_groups(whole, left).iter().any(|left| !left.of_object() && left.too_much(false))
+    left.len() > 1 && much_of_arm_is_left(whole, left)
+}
+
+/// Whether more of the arm's gap is left than numerics are, and than a cause leaves of it.
+fn much_of_arm_is_left(whole: &[Typical], left: &[Typical]) -> bool {
+    SensorGap::of_groups(whole, left).iter().any(|left| !left.of_object() && left.too_much(false))
 }
 
 /// The object's candidates that stand out once clips are held to the least scatter, whatever else the score test says.
@@ -97,9 +102,7 @@ pub(in crate::diagnose) fn seen_at_the_least_scatter<'a>(
 /// what acts only from some size on, as play does, has no slope at its neutral point. Those on the object all have one, or are
 /// fitted in any case.
 pub(in crate::diagnose) fn overlooked(bench: &Bench<'_>, step: &Step) -> Vec<usize> {
-    // What a single cause leaves of the whole gap is no reason to try all the others.
-    let left = SensorGap::of_groups(&step.whole, &step.left);
-    if !left.iter().any(|left| !left.of_object() && left.too_much(false)) {
+    if !much_of_arm_is_left(&step.whole, &step.left) {
         return Vec::new();
     }
     let rest = step.trials.iter().filter(|trial| trial.fitted.is_none() && trial.scored.signal > TESTABLE);
